@@ -1,27 +1,28 @@
-//! Linear assignment: which column for which row, at the least total cost.
+//! Linear assignment: pairs rows with columns at the least total cost.
 //!
-//! Given costs `c_ij` of `n` rows and `m` columns, choose distinct columns `j(i)` with `Σ c_i,j(i)`
-//! least. Of a matrix that is not square, `min(n, m)` rows get a column. The method is Jonker and
-//! Volgenant's (Computing 38, 325–340, 1987) in its rectangular form: augmenting row reduction
-//! assigns most rows, shortest augmenting paths (Dijkstra's, on the reduced costs
-//! `c_ij − u_i − v_j ≥ 0`) the rest. `O(min(n, m)² max(n, m))` at worst, on point sets close to
-//! `O(n m)`.
+//! Given costs `c_ij` of `n` rows and `m` columns, choose distinct columns `j(i)` that minimise
+//! `Σ c_i,j(i)`. If the matrix is not square, `min(n, m)` rows get a column. The method is that of
+//! Jonker and Volgenant (Computing 38, 325–340, 1987) in its rectangular form: augmenting row
+//! reduction assigns most rows, and shortest augmenting paths (Dijkstra's algorithm on the reduced
+//! costs `c_ij − u_i − v_j ≥ 0`) assign the rest. The worst case is `O(min(n, m)² max(n, m))`;
+//! point sets take close to `O(n m)`.
 //!
-//! The prices `u`, `v` prove the answer: `u_i + v_j ≤ c_ij`, equal on the chosen pairs. They are
-//! zero for rows and columns left over. To maximise, negate the costs. To forbid a pair, let it
-//! cost `+∞`.
+//! The prices `u`, `v` prove that the answer is optimal: `u_i + v_j ≤ c_ij`, with equality on the
+//! chosen pairs. Unassigned rows and columns have price zero. To maximise, negate the costs. To
+//! forbid a pair, set its cost to `+∞`.
 
 use crate::MatchError;
 
-/// Columns for the rows of a cost matrix (`rows × columns`, row-major) at the least total cost.
+/// Returns the column of each row of a cost matrix (`rows × columns`, row-major) at the least total
+/// cost.
 ///
-/// `None` for the rows left over where there are more rows than columns, or that only forbidden
-/// pairs (`+∞`) could serve. The number of pairs is the largest possible. The same input gives the
-/// same answer, also among ties.
+/// A row gets `None` if there are more rows than columns and it is left over, or if only forbidden
+/// pairs (`+∞`) are left for it. The number of pairs is the largest possible. The answer is
+/// deterministic, also among ties.
 ///
 /// # Errors
-/// [`MatchError::Shape`] if `costs` has not `rows · columns` entries, [`MatchError::Cost`] for NaN
-/// and `−∞`.
+/// [`MatchError::Shape`] if `costs` does not have `rows · columns` entries, [`MatchError::Cost`]
+/// for NaN and `−∞`.
 ///
 /// ```
 /// use tactile_match::linear_assignment;
@@ -43,7 +44,8 @@ pub fn linear_assignment(
     Ok(workspace.assignment)
 }
 
-/// [`linear_assignment`] with its memory kept: no allocation once it has seen the largest matrix.
+/// [`linear_assignment`] with reusable memory: it allocates only if a matrix is larger than all
+/// before.
 ///
 /// ```
 /// use tactile_match::AssignmentWorkspace;
@@ -55,20 +57,20 @@ pub fn linear_assignment(
 #[derive(Clone, Debug, Default)]
 pub struct AssignmentWorkspace {
     assignment: Vec<Option<usize>>,
-    /// `u` of the last solution.
+    /// Row prices `u` of the last solution.
     pub row_prices: Vec<f64>,
-    /// `v` of the last solution.
+    /// Column prices `v` of the last solution.
     pub column_prices: Vec<f64>,
-    /// The matrix turned so that it is not taller than wide.
+    /// The matrix, transposed if it is taller than wide.
     turned: Vec<f64>,
     search: Search,
 }
 
 impl AssignmentWorkspace {
-    /// As [`linear_assignment`].
+    /// Solves one problem, see [`linear_assignment`].
     ///
     /// # Errors
-    /// As [`linear_assignment`].
+    /// Those of [`linear_assignment`].
     pub fn solve(
         &mut self,
         costs: &[f64],
@@ -125,22 +127,22 @@ fn check(costs: &[f64], rows: usize, columns: usize) -> Result<(), MatchError> {
 
 // The search: augmenting row reduction, then shortest augmenting paths on the reduced costs.
 
-/// No row, no column.
+/// Stands for "no row" or "no column".
 const NONE: usize = usize::MAX;
 
-/// Memory of the algorithm proper, for a matrix that is not taller than wide.
+/// Working memory of the algorithm, for a matrix that is not taller than wide.
 #[derive(Clone, Debug, Default)]
 struct Search {
     column_of: Vec<usize>,
     row_of: Vec<usize>,
-    /// v. u follows from it.
+    /// Column prices `v`. The row prices `u` follow from them.
     prices: Vec<f64>,
     free: Vec<usize>,
     waiting: Vec<usize>,
-    /// Length of the shortest path to every column, and the row before it.
+    /// Length of the shortest path to each column, and the row before it.
     distance: Vec<f64>,
     before: Vec<usize>,
-    /// Columns the search has not settled yet, in any order, then those it has.
+    /// Columns that the search has not settled yet, in any order, then the settled ones.
     order: Vec<usize>,
 }
 
@@ -153,7 +155,7 @@ impl Search {
         reset(&mut self.before, columns, NONE);
         self.free.clear();
         self.free.extend(0..rows);
-        // Twice, as published: the rows a first pass displaces often settle in the second.
+        // Two passes, as published: rows that the first pass displaces often settle in the second.
         self.reduce_rows(costs, columns);
         self.reduce_rows(costs, columns);
         self.order.clear();
@@ -165,11 +167,11 @@ impl Search {
         self.free = free;
     }
 
-    /// Augmenting row reduction: every free row takes its cheapest column, and bids until the next
-    /// best would do as well.
+    /// Augmenting row reduction: each free row takes its cheapest column and raises the bid until
+    /// the second-best column costs the same.
     ///
-    /// Only columns that become assigned, and stay so, change their price: those left over keep
-    /// `v = 0`, which the rectangular problem needs.
+    /// Only columns that become assigned, and stay assigned, change their price. Unassigned columns
+    /// keep `v = 0`, as the rectangular problem requires.
     fn reduce_rows(&mut self, costs: &[f64], columns: usize) {
         self.waiting.clear();
         self.free.reverse();
@@ -206,7 +208,8 @@ impl Search {
         std::mem::swap(&mut self.free, &mut self.waiting);
     }
 
-    /// The shortest augmenting path from a free row. None if only forbidden pairs lead on.
+    /// Follows the shortest augmenting path from a free row. Returns `None` if only forbidden pairs
+    /// lead on.
     fn augment(&mut self, costs: &[f64], columns: usize, free_row: usize) {
         for (j, &c) in costs[free_row * columns..][..columns].iter().enumerate() {
             self.distance[j] = c - self.prices[j];
@@ -236,8 +239,8 @@ impl Search {
         self.flip(sink, free_row);
     }
 
-    /// Where in the order the open column with the shortest path stands. A column without a row
-    /// wins a tie.
+    /// Position in the order of the open column with the shortest path. An unassigned column wins a
+    /// tie.
     fn nearest(&self, open: usize) -> usize {
         let mut best = 0;
         for at in 1..open {
@@ -252,7 +255,8 @@ impl Search {
         best
     }
 
-    /// Paths through a column that has just been settled, at `reach`, and the row it belongs to.
+    /// Updates the paths through a column that was just settled at distance `reach`, and through
+    /// its row.
     fn relax(&mut self, costs: &[f64], columns: usize, (column, reach): (usize, f64), open: usize) {
         let row = self.row_of[column];
         let costs = &costs[row * columns..][..columns];
@@ -266,7 +270,7 @@ impl Search {
         }
     }
 
-    /// Exchanges assigned and free pairs along the path that ends in `column`.
+    /// Swaps assigned and free pairs along the path that ends in `column`.
     fn flip(&mut self, mut column: usize, free_row: usize) {
         loop {
             let row = self.before[column];
@@ -278,7 +282,7 @@ impl Search {
         }
     }
 
-    /// `u_i` from complementary slackness. Zero for a row left over.
+    /// `u_i` by complementary slackness. Zero if the row is unassigned.
     fn row_price(&self, costs: &[f64], row: usize) -> f64 {
         match self.column_of[row] {
             NONE => 0.0,
@@ -287,8 +291,8 @@ impl Search {
     }
 }
 
-/// The columns with the least and the second least reduced cost `c − v`, with these costs. `+∞`
-/// where there is no second.
+/// The columns with the smallest and second smallest reduced cost `c − v`, and these costs. The
+/// second cost is `+∞` if there is only one column.
 fn two_cheapest(costs: &[f64], prices: &[f64]) -> ((usize, f64), (usize, f64)) {
     let (mut best, mut second) = ((0, f64::INFINITY), (0, f64::INFINITY));
     for (j, (&c, &v)) in costs.iter().zip(prices).enumerate() {

@@ -1,9 +1,9 @@
 //! Coherent point drift: non-rigid registration by maximum likelihood.
 //!
-//! The model points `y_m` (`M` of them) are the centres of a Gaussian mixture of one variance `σ²`,
-//! with a uniform component of weight `w` for outliers. The target points `x_n` (`N`) are its
-//! sample. Expectation maximisation alternates (Myronenko & Song, Point set registration: coherent
-//! point drift, IEEE PAMI 32, 2262–2275, 2010):
+//! The model points `y_m` (`M` of them) are the centres of a Gaussian mixture with a common
+//! variance `σ²` and a uniform component of weight `w` for outliers. The target points `x_n` (`N`
+//! of them) are a sample from it. Expectation maximisation alternates these two steps (Myronenko &
+//! Song, Point set registration: coherent point drift, IEEE PAMI 32, 2262–2275, 2010):
 //!
 //! ```text
 //! P_mn = exp(−|x_n − T(y_m)|²/2σ²) / (Σ_k exp(−|x_n − T(y_k)|²/2σ²) + (2πσ²)^{D/2} w M / ((1−w) N))
@@ -11,11 +11,12 @@
 //! σ²   = Σ P_mn |x_n − T(y_m)|² / (D Σ P_mn)
 //! ```
 //!
-//! The motion is `T(y) = y + Σ_k w_k exp(−|y − y_k|²/2β²)`, neighbours moving coherently. All
-//! parameters refer to sets of root mean square radius one ([`Normalization`]): the same settings
-//! mean the same in every unit. Two things differ from the usual programs, neither in the answer:
-//! `P` is never stored while iterating, and the Gaussian kernel is factorised once, to the rank it
-//! numerically has, instead of solving an `M × M` system in every iteration.
+//! The motion is `T(y) = y + Σ_k w_k exp(−|y − y_k|²/2β²)`, so neighbours move coherently. All
+//! parameters refer to sets scaled to a root mean square radius of one ([`Normalization`]), so a
+//! setting means the same in every unit. The implementation differs from the usual programs in two
+//! ways that do not change the result: `P` is never stored during the iterations, and the Gaussian
+//! kernel is factorised once, to its numerical rank, instead of solving an `M × M` system in every
+//! iteration.
 
 use crate::error::{at_least_one, option_within, point_sets};
 use crate::frame::{Frame, spread};
@@ -25,7 +26,7 @@ use nalgebra::{Point, SMatrix, SVector};
 use tactile_core::vectorised;
 use tactile_tps::Warp;
 
-/// How the two sets are brought to size one.
+/// How the two sets are normalised.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -43,21 +44,21 @@ use tactile_tps::Warp;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Normalization {
-    /// Each set by its own centre and root mean square radius: customary in coherent point drift,
-    /// and right whatever lies between the sets.
+    /// Each set by its own centroid and root mean square radius. This is customary in coherent
+    /// point drift, and correct for any motion between the sets.
     #[default]
     Each,
-    /// Both by the centre and the root mean square radius of the model: for sets that nearly lie on
-    /// one another, where points without a partner would shift the centre of one of them.
+    /// Both sets by the centroid and root mean square radius of the model. Use it for sets that
+    /// nearly coincide, where points without a partner would shift the centroid of one set.
     Model,
-    /// None: the parameters are in the units of the points.
+    /// No normalisation: the parameters are in the units of the points.
     Off,
 }
 
 /// Coherent point drift as a [`PointMatcher`](crate::PointMatcher).
 ///
-/// Where the sets are far apart in rotation it finds a local optimum, as every method of its kind
-/// does. The time is `O((M N + M r²) · iterations)`, with `r` the rank of the kernel.
+/// If a large rotation separates the sets, it finds a local optimum, as every method of its kind
+/// does. The run time is `O((M N + M r²) · iterations)`, with `r` the rank of the kernel.
 ///
 /// ```
 /// use nalgebra::{Point2, Vector2};
@@ -86,7 +87,7 @@ pub enum Normalization {
 /// ```
 ///
 /// # Options
-/// All are independent of the units of the points.
+/// All options are independent of the units of the points.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -114,11 +115,12 @@ pub enum Normalization {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoherentPointDrift {
-    /// Width of the Gaussian kernel, in root mean square radii: how far neighbours move together.
+    /// Width of the Gaussian kernel in root mean square radii: the distance over which neighbours
+    /// move together.
     beta: f64,
     /// Weight of smoothness against likelihood.
     lambda: f64,
-    /// Greatest rank of the kernel. `None` for the rank it numerically has.
+    /// Maximum rank of the kernel. `None` for its numerical rank.
     rank: Option<usize>,
     outlier_weight: f64,
     tolerance: f64,
@@ -141,8 +143,9 @@ impl Default for CoherentPointDrift {
 }
 
 impl CoherentPointDrift {
-    /// Sets the width β of the kernel, in root mean square radii of the model: how far neighbours
-    /// move together (default 2), and the weight λ of smoothness against likelihood (default 3).
+    /// Sets the width β of the kernel and the weight λ of smoothness against likelihood. β is the
+    /// distance over which neighbours move together, in root mean square radii of the model
+    /// (default 2); the default of λ is 3.
     ///
     /// # Errors
     /// [`MatchError::InvalidOption`] unless both are positive and finite.
@@ -153,7 +156,7 @@ impl CoherentPointDrift {
         Ok(self)
     }
 
-    /// Sets the greatest rank of the kernel (default: the rank it numerically has). Thirty is
+    /// Sets the maximum rank of the kernel (default: its numerical rank). A rank of thirty is
     /// customary for speed.
     ///
     /// # Errors
@@ -164,8 +167,8 @@ impl CoherentPointDrift {
         Ok(self)
     }
 
-    /// Sets the weight `w` of the uniform component (default 0.1): about the share of target points
-    /// that are outliers.
+    /// Sets the weight `w` of the uniform component (default 0.1), approximately the fraction of
+    /// target points that are outliers.
     ///
     /// # Errors
     /// [`MatchError::InvalidOption`] outside `[0, 1)`.
@@ -175,7 +178,7 @@ impl CoherentPointDrift {
         Ok(self)
     }
 
-    /// Sets the change of `σ²` at which the iterations end (default 10⁻⁵).
+    /// Sets the change of `σ²` at which the iterations stop (default 10⁻⁵).
     ///
     /// # Errors
     /// [`MatchError::InvalidOption`] unless it is finite and not negative.
@@ -185,7 +188,7 @@ impl CoherentPointDrift {
         Ok(self)
     }
 
-    /// Sets the most iterations (default 150).
+    /// Sets the maximum number of iterations (default 150).
     ///
     /// # Errors
     /// [`MatchError::InvalidOption`] for 0.
@@ -195,7 +198,7 @@ impl CoherentPointDrift {
         Ok(self)
     }
 
-    /// Sets the frame of the registration (default [`Normalization::Each`]).
+    /// Sets the normalisation of the sets (default [`Normalization::Each`]).
     #[must_use]
     pub fn with_normalization(mut self, normalization: Normalization) -> Self {
         self.normalization = normalization;
@@ -205,20 +208,20 @@ impl CoherentPointDrift {
 
 // Expectation maximisation.
 //
-// With the posterior P fixed the motion is a regression under the prior covariance
-// `G_mk = exp(−|y_m − y_k|²/2β²)`: weights `P 1`, targets `P X / P 1 − Y`, noise variance λσ²
-// (Myronenko & Song, eq. 22–23: `(diag(P1) G + λσ² I) W = P X − diag(P1) Y`).
+// For a fixed posterior P the motion is a regression under the prior covariance
+// `G_mk = exp(−|y_m − y_k|²/2β²)` with weights `P 1`, targets `P X / P 1 − Y` and noise variance
+// λσ² (Myronenko & Song, eq. 22–23: `(diag(P1) G + λσ² I) W = P X − diag(P1) Y`).
 
-/// What is left of the kernel's diagonal when its factorisation ends: far below what the ridge λσ²
-/// lets through.
+/// Residual diagonal of the kernel at which its factorisation stops, far below what the ridge λσ²
+/// resolves.
 const LEFT_OUT: f64 = 1e-12;
-/// Soft matches below this weight are left out.
+/// Soft matches below this weight are dropped.
 const FAINTEST: f64 = 1e-4;
 
-/// A registration under way, in the frame of the sets.
+/// A registration in progress, in the normalised frame of the sets.
 struct Registration<const D: usize> {
     options: CoherentPointDrift,
-    /// Of model and target.
+    /// Frames of the model and the target.
     frames: [Frame<D>; 2],
     model: Vec<[f64; D]>,
     target: Vec<[f64; D]>,
@@ -275,7 +278,7 @@ impl<const D: usize> Registration<D> {
         }
     }
 
-    /// E-step and M-step in turn, until σ² stands still.
+    /// Alternates E-step and M-step until σ² converges.
     fn run(&mut self) {
         if self.sigma2 <= 0.0 {
             self.stop = StopReason::Exact; // all points of both sets coincide
@@ -295,7 +298,7 @@ impl<const D: usize> Registration<D> {
         }
     }
 
-    /// The motion that the posterior asks for.
+    /// Fits the motion to the posterior and moves the model.
     fn move_model(&mut self) {
         let (stride, ridge) = (self.kernel.stride, self.options.lambda * self.sigma2);
         let Posterior {
@@ -325,20 +328,20 @@ impl<const D: usize> Registration<D> {
         }
     }
 
-    /// Weight of the uniform component relative to one Gaussian's peak at the present variance,
-    /// `(2πσ²)^{D/2} w M / ((1 − w) N)`.
+    /// Weight of the uniform component relative to the peak of one Gaussian at the current
+    /// variance: `(2πσ²)^{D/2} w M / ((1 − w) N)`.
     fn uniform(&self) -> f64 {
         let w = self.options.outlier_weight;
         let volume = (std::f64::consts::TAU * self.sigma2).powf(0.5 * D as f64);
         volume * w / (1.0 - w) * self.model.len() as f64 / self.target.len() as f64
     }
 
-    /// `σ² = Σ P_mn |x_n − T(y_m)|² / (D Σ P_mn)`. A tenth of the tolerance where rounding makes it
-    /// zero or less.
+    /// Updates `σ² = Σ P_mn |x_n − T(y_m)|² / (D Σ P_mn)`. If rounding makes it zero or negative, a
+    /// tenth of the tolerance takes its place.
     fn update_variance(&mut self) {
         let mass: f64 = self.posterior.model_mass.iter().sum();
         if mass <= f64::MIN_POSITIVE {
-            return; // all are outliers: nothing to learn from
+            return; // all points are outliers, so the variance has no data
         }
         let mut sum = 0.0;
         for d in 0..D {
@@ -349,7 +352,7 @@ impl<const D: usize> Registration<D> {
                 - 2.0 * crosses.map(|(t, p)| p * t).sum::<f64>()
                 + moved.map(|(t, p)| p * t * t).sum::<f64>();
         }
-        // Coordinates of size one are not known better than ε, and 1/σ² must stay finite.
+        // Coordinates of unit size carry an error of ε, and 1/σ² must stay finite.
         let least = f64::EPSILON * f64::EPSILON;
         let variance = sum / (mass * D as f64);
         self.sigma2 = if variance > 0.0 {
@@ -360,7 +363,7 @@ impl<const D: usize> Registration<D> {
         .max(least);
     }
 
-    /// The map that was found, for any point: the identity before the first iteration.
+    /// The fitted map for any point. Before the first iteration it is the identity.
     fn warp(&self) -> DriftWarp<D> {
         let pivots = &self.kernel.pivots[..self.motion.solution.len()];
         DriftWarp {
@@ -371,8 +374,8 @@ impl<const D: usize> Registration<D> {
         }
     }
 
-    /// Weights `w` at the pivots with `Σ_k G(x, y_k) w_k = (L z)(x)`: solves `Cᵀ w = z`, `C` the
-    /// pivots' rows of `L`.
+    /// Weights `w` at the pivots with `Σ_k G(x, y_k) w_k = (L z)(x)`: solves `Cᵀ w = z`, where `C`
+    /// holds the pivots' rows of `L`.
     fn pivot_weights(&self, pivots: &[usize]) -> Vec<SVector<f64, D>> {
         let solution = self.motion.solution.iter();
         let mut weights: Vec<SVector<f64, D>> = solution.map(|&z| z.into()).collect();
@@ -388,7 +391,7 @@ impl<const D: usize> Registration<D> {
     }
 }
 
-/// Mean squared distance of all pairs, per axis.
+/// Mean squared distance over all pairs, per axis.
 fn mean_variance<const D: usize>(model: &[[f64; D]], target: &[[f64; D]]) -> f64 {
     let moments = |points: &[[f64; D]], d: usize| {
         let n = points.len() as f64;
@@ -403,28 +406,28 @@ fn mean_variance<const D: usize>(model: &[[f64; D]], target: &[[f64; D]]) -> f64
     (0..D).map(along).sum::<f64>() / D as f64
 }
 
-// The E-step: which target point belongs to which model point, as sums over the posterior `P`
-// without storing it.
+// The E-step: sums over the posterior `P` (which target point belongs to which model point) without
+// storing `P`.
 
-/// The sums over the posterior that the M-step needs, for `M` model and `N` target points.
+/// Sums over the posterior that the M-step needs, for `M` model and `N` target points.
 #[derive(Clone, Debug, Default)]
 struct Posterior<const D: usize> {
-    /// `P 1`: how much of the target every model point has.
+    /// `P 1`: posterior mass of each model point.
     model_mass: Vec<f64>,
-    /// `Pᵀ 1`: how much of every target point is no outlier.
+    /// `Pᵀ 1`: probability of each target point that it is not an outlier.
     target_mass: Vec<f64>,
     /// `P X`.
     weighted: Axes<D>,
-    /// `P X / P 1 − Y`.
+    /// `P X / P 1 − Y`, the displacements to fit.
     wanted: Axes<D>,
-    /// Negative log-likelihood, up to a constant that depends on the sizes alone.
+    /// Negative log-likelihood, up to a constant that depends only on the numbers of points.
     energy: f64,
     /// One column of `P`.
     column: Vec<f64>,
 }
 
 impl<const D: usize> Posterior<D> {
-    /// All sums for model points that have moved to `moved`. `O(M N)`.
+    /// Computes all sums for model points at the positions `moved`. `O(M N)`.
     fn update(&mut self, moved: &[Vec<f64>; D], target: &[[f64; D]], sigma2: f64, uniform: f64) {
         let vectors = [&mut self.model_mass, &mut self.column];
         for sums in self.weighted.0.iter_mut().chain(vectors) {
@@ -440,7 +443,7 @@ impl<const D: usize> Posterior<D> {
                     let sum = gaussians(&mut self.column, moved, x, sigma2);
                     let total = sum + uniform;
                     if total <= 0.0 {
-                        // Out of reach of every model point, and no outlier component to take it.
+                        // No model point is within reach, and no outlier component takes the point.
                         self.target_mass.push(0.0);
                         continue;
                     }
@@ -458,7 +461,7 @@ impl<const D: usize> Posterior<D> {
     }
 }
 
-/// `exp(−|x − y_m|² / 2σ²)` for every model point. Returns their sum.
+/// `exp(−|x − y_m|² / 2σ²)` for each model point. Returns the sum of these values.
 #[inline(always)]
 fn gaussians<const D: usize>(
     column: &mut [f64],
@@ -487,7 +490,7 @@ fn scale_and_add(column: &mut [f64], sums: &mut [f64], factor: f64) {
     }
 }
 
-/// The sum in eight lanes, which vectorise without reordering: the same bits on every machine.
+/// Sums in eight lanes. They vectorise without reordering, so every machine gives the same bits.
 #[inline(always)]
 fn lane_sum(values: &[f64]) -> f64 {
     let mut lanes = [0.0; 8];
@@ -500,16 +503,17 @@ fn lane_sum(values: &[f64]) -> f64 {
     lanes.iter().sum::<f64>() + rest.iter().sum::<f64>()
 }
 
-// eˣ in loops that vectorise.
+// eˣ without branches, so that loops over it vectorise.
 
-/// `e^x` for `x <= 0`, to about one unit in the last place. Exactly zero below −708, where a
-/// product with anything of size one would be lost anyway. No branch and no table, so that a loop
-/// over it vectorises. Plain products and sums, so that every machine gives the same bits.
+/// `e^x` for `x <= 0`, to about one unit in the last place. Below −708 it is exactly zero: a
+/// product with a number of size one would underflow anyway. It has no branch and no table, so that
+/// a loop over it vectorises, and it uses only products and sums, so that every machine gives the
+/// same bits.
 #[inline(always)]
 fn exp_of_negative(x: f64) -> f64 {
     const LOWEST: f64 = -708.0;
     // Adding 1.5·2⁵² rounds to an integer and leaves it, offset by the exponent's bias, in the
-    // lowest bits.
+    // lowest bits of the sum.
     const SHIFT: f64 = 6_755_399_441_055_744.0;
     const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
     const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
@@ -522,7 +526,7 @@ fn exp_of_negative(x: f64) -> f64 {
     if x > LOWEST { value } else { 0.0 }
 }
 
-/// Σ rⁿ/n! to n = 13: below 2⁻⁵³ of eʳ for |r| ≤ ½ ln 2.
+/// Σ rⁿ/n! up to n = 13: the truncation error is below 2⁻⁵³ of eʳ for |r| ≤ ½ ln 2.
 #[inline(always)]
 fn taylor(r: f64) -> f64 {
     const INVERSE_FACTORIAL: [f64; 12] = [
@@ -546,11 +550,11 @@ fn taylor(r: f64) -> f64 {
     1.0 + (r + r * r * sum)
 }
 
-// The map a registration found, for any point of space.
+// The map that a registration found, evaluated at any point.
 
-/// The map found by [`CoherentPointDrift`]: in the frame of the
-/// registration `y ↦ y + Σ_k w_k exp(−|y − p_k|² / 2β²)`. It takes the model points to
-/// where the registration left them, and any other point along.
+/// The map found by [`CoherentPointDrift`], in the frame of the registration:
+/// `y ↦ y + Σ_k w_k exp(−|y − p_k|² / 2β²)`. It takes the model points to their registered
+/// positions and interpolates between them.
 #[derive(Clone, Debug, PartialEq)]
 struct DriftWarp<const D: usize> {
     frames: [Frame<D>; 2],
@@ -587,7 +591,7 @@ impl<const D: usize> Warp<D> for DriftWarp<D> {
     }
 }
 
-// From the mixture at its end to a [`Matching`]: posterior, pairs, confidences, covariances.
+// From the final mixture to a [`Matching`]: posterior, pairs, confidences and covariances.
 
 impl CoherentPointDrift {
     /// [`PointMatcher::match_points`](crate::PointMatcher::match_points).
@@ -604,7 +608,7 @@ impl CoherentPointDrift {
 }
 
 impl<const D: usize> Registration<D> {
-    /// The posterior `P` at the end, a row of `M` entries per target point.
+    /// The final posterior `P`, one row of `M` entries per target point.
     fn posterior(&self) -> Vec<f64> {
         let sigma2 = self.sigma2.max(f64::MIN_POSITIVE);
         let mut rows = vec![0.0; self.model.len() * self.target.len()];
@@ -629,12 +633,13 @@ impl<const D: usize> Registration<D> {
             let column = (0..target.len()).map(|n| (n, posterior[n * m_len + m]));
             let row: Vec<(usize, f64)> = column.filter(|p| p.1 > FAINTEST).collect();
             let mass = row.iter().map(|p| p.1).sum::<f64>();
-            // Many targets may have one model point; a row of M has sum one.
+            // Several targets may share one model point, whereas a row of M must sum to one.
             let share = |p: f64| p / mass.max(1.0);
             found.soft.push_row(row.iter().map(|&(n, p)| (n, share(p))));
             let sure = partner.map_or(1.0 - mass.min(1.0), |n| share(posterior[n * m_len + m]));
             found.confidence.push(sure.clamp(0.0, 1.0));
-            // The spread of the soft matches about their mean, and the noise σ² of the mixture.
+            // The covariance is the spread of the soft matches about their mean plus the noise σ²
+            // of the mixture.
             let spread = spread(row.iter().map(|&(n, p)| (self.target[n].into(), p)));
             let covariance = spread + SMatrix::identity() * self.sigma2;
             found
@@ -650,12 +655,13 @@ impl<const D: usize> Registration<D> {
     }
 }
 
-/// Distinct targets for the model points with the most posterior in sum. A pair stays only if its
-/// target is at least as likely the model point's as an outlier.
+/// Assigns distinct targets to the model points so that the sum of the posterior is largest. A pair
+/// is kept only if its target is at least as likely to belong to the model point as to be an
+/// outlier.
 fn pairs(posterior: &[f64], model_len: usize, target_len: usize) -> Vec<Option<usize>> {
     let costs: Vec<f64> = posterior.iter().map(|p| -p).collect();
     let mut assignment = vec![None; model_len];
-    // The costs are probabilities: finite, and of the right number.
+    // The costs are probabilities, so they are finite, and their number is correct by construction.
     let columns = linear_assignment(&costs, target_len, model_len).unwrap_or_default();
     for (n, m) in columns.iter().enumerate() {
         let Some(m) = *m else { continue };

@@ -1,10 +1,10 @@
-//! The crate's one error type.
+//! The error type of the crate.
 
 use nalgebra::Point;
 use std::error::Error;
 use tactile_core::CustomError;
 
-/// Why a match could not be attempted. Not converging is no error: see
+/// Why a match could not be attempted. A run that does not converge is not an error: see
 /// [`StopReason`](crate::StopReason).
 ///
 /// ```
@@ -24,82 +24,82 @@ pub enum MatchError {
     /// A point set has no points.
     #[error("the {set} has no points")]
     Empty {
-        /// The empty set, "model" or "target".
+        /// Name of the empty set, "model" or "target".
         set: &'static str,
     },
-    /// Points of another space than the plane and space, which the search has no instance for.
+    /// The points are neither in the plane nor in space, the only two dimensions supported.
     #[error("points have {dimension} coordinates, expected 2 or 3")]
     Dimension {
-        /// Coordinates of a point.
+        /// Number of coordinates of a point.
         dimension: usize,
     },
-    /// A coordinate is NaN, infinite or so large that its square is (beyond 10¹⁵³ in double, 10¹⁸
-    /// in single precision).
+    /// A coordinate is NaN, infinite or too large to be squared (above 10¹⁵³ in double precision,
+    /// 10¹⁸ in single precision).
     #[error(
         "point {row} of the {set} has a coordinate that is not finite or too large to be squared"
     )]
     NotFinite {
-        /// The set the point belongs to, "model" or "target".
+        /// Name of the point's set, "model" or "target".
         set: &'static str,
-        /// Its row.
+        /// Row of the point.
         row: usize,
     },
-    /// So many points of a large set lie in one place that each is a candidate for each: the table
-    /// of candidates grows with the square of their number.
+    /// Too many points of a large set coincide: each is a candidate for each, so the table of
+    /// candidates grows with the square of their number.
     #[error("{count} points of the {set} lie in one place, at most {limit} can be matched")]
     Coincident {
-        /// The set, "model" or "target".
+        /// Name of the set, "model" or "target".
         set: &'static str,
-        /// Points in one place.
+        /// Number of coincident points.
         count: usize,
-        /// The most that are allowed.
+        /// The maximum number allowed.
         limit: usize,
     },
-    /// An option is outside its range (or NaN).
+    /// An option is outside its range or NaN.
     #[error("option {option} = {value} is outside {expected}")]
     InvalidOption {
-        /// The option's name.
+        /// Name of the option.
         option: &'static str,
-        /// The value found.
+        /// The value given.
         value: f64,
-        /// The values it may take.
+        /// The range of valid values.
         expected: &'static str,
     },
-    /// A slice has not the length its shape says.
+    /// The length of a slice does not match its stated shape.
     #[error("{what}: expected {expected} entries, found {found}")]
     Shape {
-        /// What the slice holds.
+        /// Content of the slice.
         what: &'static str,
-        /// Entries its shape asks for.
+        /// Number of entries required by the shape.
         expected: usize,
-        /// Entries it has.
+        /// Number of entries found.
         found: usize,
     },
     /// A cost is NaN or `−∞`.
     #[error("the cost of row {row}, column {column} is NaN or minus infinity")]
     Cost {
-        /// Its row.
+        /// Row of the cost.
         row: usize,
-        /// Its column.
+        /// Column of the cost.
         column: usize,
     },
-    /// A pair has a row that its set does not have, or a row that an earlier pair has.
+    /// A pair names a row that does not exist in its set, or a row of an earlier pair.
     #[error("pair {pair} has row {row} of the {set}, which does not exist or is taken")]
     PairRow {
         /// Index of the pair.
         pair: usize,
-        /// The set, "model" or "target".
+        /// Name of the set, "model" or "target".
         set: &'static str,
-        /// The row in that set.
+        /// Row in that set.
         row: usize,
     },
-    /// The failure of a matcher of the user's own.
+    /// A user-defined matcher failed.
     #[error(transparent)]
     Custom(CustomError),
 }
 
 impl MatchError {
-    /// The failure of a matcher of your own.
+    /// Wraps the error of a user-defined matcher.
     ///
     /// ```
     /// use tactile_match::MatchError;
@@ -123,12 +123,12 @@ pub(crate) fn point_sets<const D: usize>(
     point_set("target", target)
 }
 
-/// Whether a coordinate can be squared, with room for differences and for the sum of their squares.
+/// Whether a coordinate is small enough that sums of squared differences stay finite.
 pub(crate) fn usable(coordinate: f64) -> bool {
     (coordinate * coordinate * 16.0).is_finite()
 }
 
-/// The same for one set.
+/// Like [`point_sets`], for one set.
 pub(crate) fn point_set<const D: usize>(
     set: &'static str,
     points: &[Point<f64, D>],
@@ -142,10 +142,10 @@ pub(crate) fn point_set<const D: usize>(
     }
 }
 
-/// Most points of a large set in one place. Their candidates take 5 MB.
+/// Maximum number of coincident points in a large set. Their candidates take 5 MB.
 const MAX_COINCIDENT: usize = 1000;
 
-/// Rejects a set with too many points in one place: O(n log n), in the memory of `rows`.
+/// Rejects a set with too many coincident points: O(n log n). `rows` is working memory.
 pub(crate) fn spread_out<const D: usize>(
     set: &'static str,
     points: &[Point<f64, D>],
@@ -171,7 +171,7 @@ pub(crate) fn spread_out<const D: usize>(
     Ok(())
 }
 
-/// The largest distance of a pair, which must be positive and finite.
+/// Checks the maximum distance of a pair, which must be positive and finite.
 pub(crate) fn valid_distance(max_distance: f64) -> Result<f64, MatchError> {
     option_within(
         "max_distance",

@@ -1,9 +1,9 @@
-//! A frame to work in: centre and size taken out, so that no parameter depends on the units of the
-//! points and no square under- or overflows.
+//! Normalised coordinates: centre and size are removed, so that no parameter depends on the units
+//! of the points and no square underflows or overflows.
 
 use nalgebra::{Point, SMatrix, SVector};
 
-/// `x ↦ (x − centre) / scale`.
+/// The map `x ↦ (x − centre) / scale`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Frame<const D: usize> {
     pub centre: SVector<f64, D>,
@@ -20,7 +20,7 @@ impl<const D: usize> Default for Frame<D> {
 }
 
 impl<const D: usize> Frame<D> {
-    /// Centre and root mean square radius of a set. Scale one where all points coincide.
+    /// Centroid and root mean square radius of a set. The scale is one if all points coincide.
     pub(crate) fn of(points: &[Point<f64, D>]) -> Self {
         let (centre, radius) = centre_and_radius(points);
         Self {
@@ -29,8 +29,8 @@ impl<const D: usize> Frame<D> {
         }
     }
 
-    /// The model's centre and the largest distance from it along an axis in either set: for sets
-    /// compared as they lie.
+    /// The model's centroid and the largest distance from it along an axis in either set. This
+    /// frame is for sets that are compared in place.
     pub(crate) fn of_both(model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Self {
         let centre = Self::of(model).centre;
         let largest = model
@@ -44,23 +44,23 @@ impl<const D: usize> Frame<D> {
         }
     }
 
-    /// A point in this frame.
+    /// Converts a point into this frame.
     pub(crate) fn inside(&self, point: &Point<f64, D>) -> SVector<f64, D> {
         (point.coords - self.centre) / self.scale
     }
 
-    /// A point of this frame in the units of the caller.
+    /// Converts a point of this frame into the units of the caller.
     pub(crate) fn leave(&self, inside: SVector<f64, D>) -> Point<f64, D> {
         Point::from(inside * self.scale + self.centre)
     }
 }
 
-/// Centroid of a set and its root mean square radius, zero where all points coincide.
+/// Centroid of a set and its root mean square radius, which is zero if all points coincide.
 pub(crate) fn centre_and_radius<const D: usize>(
     points: &[Point<f64, D>],
 ) -> (SVector<f64, D>, f64) {
     let n = points.len() as f64;
-    // Sums of differences keep the digits of sets far from the origin.
+    // Differences from a point of the set preserve precision far from the origin.
     let origin = points[0].coords;
     let centre = origin
         + points
@@ -68,7 +68,7 @@ pub(crate) fn centre_and_radius<const D: usize>(
             .map(|p| p.coords - origin)
             .sum::<SVector<f64, D>>()
             / n;
-    // The largest radius taken out first: no square under- or overflows.
+    // Dividing by the largest radius first keeps the squares from underflow and overflow.
     let largest = points
         .iter()
         .map(|p| (p.coords - centre).amax())
@@ -83,7 +83,8 @@ pub(crate) fn centre_and_radius<const D: usize>(
     (centre, largest * (squares / n).sqrt())
 }
 
-/// Covariance of a place drawn from these with their weights. Zero where there is no weight.
+/// Covariance of a position drawn from these points with their weights. Zero if the weights sum to
+/// zero.
 pub(crate) fn spread<const D: usize>(
     places: impl Iterator<Item = (SVector<f64, D>, f64)> + Clone,
 ) -> SMatrix<f64, D, D> {

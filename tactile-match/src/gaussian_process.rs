@@ -1,67 +1,67 @@
-//! A Gaussian process prior on displacements as a low-rank factor, and the regression under it.
+//! A Gaussian process prior on displacements as a low-rank factor, and regression under this prior.
 
 use crate::kernels::{LANES, Stripe, TOGETHER, cholesky, combine, normal_equations, solve, whiten};
 use tactile_core::vectorised;
 
-// The prior on warps: a Gaussian process, kept as a low-rank factor.
+// The prior on warps is a Gaussian process, stored as a low-rank factor.
 //
 // A displacement field is a priori an affine field plus a smooth one,
 // `cov(u(x), u(x')) = τ² exp(−|x − x'|²/2ℓ²) + τₐ² (1 + x·x')` for each axis. Smooth kernels have
-// few modes: the pivoted Cholesky factor `K ≈ L Lᵀ` reaches the wanted accuracy with 20 to 40
-// columns whatever the number of points, so that a weighted fit costs `O(I r²)`.
+// few modes: the pivoted Cholesky factor `K ≈ L Lᵀ` reaches the required accuracy with 20 to 40
+// columns for any number of points, so that a weighted fit costs `O(I r²)`.
 
-/// Scales of the prior, in radii of the model.
+/// Scales of the prior, in root mean square radii of the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct PriorScales {
-    /// Length ℓ over which the warp bends.
+    /// Correlation length ℓ of the bending.
     pub length: f64,
     /// Standard deviation τ of the bending displacement.
     pub bending: f64,
-    /// Standard deviation τₐ of the affine part's entries.
+    /// Standard deviation τₐ of the entries of the affine part.
     pub affine: f64,
 }
 
-/// Largest number of columns kept.
+/// Maximum number of columns kept.
 const MAX_RANK: usize = 64;
 
-/// Variance that the factor leaves out of sets of up to [`DENSE`] points, relative to the largest:
-/// a thousandth of a radius.
+/// Variance neglected by the factor for sets of up to [`DENSE`] points, relative to the largest
+/// variance: the deviation is a thousandth of a radius.
 const LEFT_OUT: f64 = 1e-6;
-/// Denser sets resolve less than that: a sixtieth of their spacing.
+/// Sets above this number of points need more accuracy: a sixtieth of their spacing.
 const DENSE: f64 = 1700.0;
-/// Variance left out that the noise hides, relative to the noise's.
+/// Neglected variance that the noise hides, relative to the variance of the noise.
 const HIDDEN: f64 = 0.01;
 
 /// The factor `L` of the prior covariance at the model points, column by column.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Prior {
-    /// Length of a column: the number of points, padded.
+    /// Length of a column: the number of points plus padding.
     pub stride: usize,
     columns: Vec<f64>,
-    /// Largest variance left out before every column.
+    /// Largest remaining variance before each column.
     left: Vec<f64>,
     pub pivots: Vec<usize>,
     diagonal: Vec<f64>,
-    /// What it was built for: the same again costs nothing.
+    /// Points of the last factorisation: a repeated call with them costs nothing.
     points: Vec<f64>,
     scales: PriorScales,
     detail: Detail,
 }
 
-/// How much of a covariance its factor holds.
+/// Accuracy of the factor of a covariance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Detail {
-    /// Largest number of columns kept.
+    /// Maximum number of columns kept.
     pub rank: usize,
-    /// Variance left out, relative to the largest.
+    /// Neglected variance, relative to the largest.
     pub left_out: f64,
-    /// A fit does without the columns whose variance is this share of the noise's.
+    /// A fit omits the columns whose variance is below this fraction of the noise variance.
     pub hidden: f64,
 }
 
 impl Prior {
-    /// Factors the covariance at `points` (in the frame's units), as far as it matters beside the
-    /// points' distances: `O(I r²)`.
+    /// Factors the covariance at `points` (in the units of the frame), to an accuracy that depends
+    /// on the spacing of the points: `O(I r²)`.
     pub(crate) fn build<const D: usize>(&mut self, points: &[[f64; D]], scales: PriorScales) {
         let denser = (DENSE / points.len() as f64).powf(2.0 / D as f64).min(1.0);
         let detail = Detail {
@@ -150,7 +150,7 @@ impl Prior {
         self.pivots.push(pivot);
     }
 
-    /// Columns that matter beside noise of variance `noise`.
+    /// Number of columns that matter for noise of variance `noise`.
     pub(crate) fn rank_beside(&self, noise: f64) -> usize {
         self.left
             .partition_point(|&left| left > self.detail.hidden * noise)
@@ -162,14 +162,14 @@ impl Prior {
     }
 }
 
-/// Index of the first largest value.
+/// Index of the largest value, the first among equals.
 fn largest(values: &[f64]) -> usize {
     (1..values.len()).fold(0, |best, i| if values[i] > values[best] { i } else { best })
 }
 
-// Coordinates kept as one padded array an axis.
+// Coordinates, stored as one padded array per axis.
 
-/// One array an axis.
+/// One array per axis.
 #[derive(Clone, Debug)]
 pub(crate) struct Axes<const D: usize>(pub(crate) [Vec<f64>; D]);
 
@@ -180,7 +180,7 @@ impl<const D: usize> Default for Axes<D> {
 }
 
 impl<const D: usize> Axes<D> {
-    /// Takes `rows`, padded to `stride`.
+    /// Stores `rows`, padded to `stride`.
     pub(crate) fn fill(&mut self, stride: usize, rows: impl Iterator<Item = [f64; D]>) {
         self.0.iter_mut().for_each(Vec::clear);
         for row in rows {
@@ -196,39 +196,38 @@ impl<const D: usize> Axes<D> {
 // Weighted regression under the prior.
 //
 // With targets `zᵢ`, weights `wᵢ` and noise variance σ², the displacement is `u = L c`,
-// `(Lᵀ W L + σ² 1) c = Lᵀ W z`; its variance at point i is `vᵢ = σ² Lᵢ (Lᵀ W L + σ² 1)⁻¹ Lᵢᵀ`. What
-// the other points say about point i follows without another fit: with the leverage
-// `hᵢ = wᵢ vᵢ/σ²`, the prediction that leaves i out is `(uᵢ − hᵢ zᵢ)/(1 − hᵢ)`.
+// `(Lᵀ W L + σ² 1) c = Lᵀ W z`, and its variance at point i is `vᵢ = σ² Lᵢ (Lᵀ W L + σ² 1)⁻¹ Lᵢᵀ`.
+// The leave-one-out prediction of point i needs no second fit: with the leverage `hᵢ = wᵢ vᵢ/σ²` it
+// is `(uᵢ − hᵢ zᵢ)/(1 − hᵢ)`.
 
-/// Displacements that the model points should have, and how much each counts. Both padded with
-/// zeros.
+/// Target displacements of the model points and their weights, both padded with zeros.
 #[derive(Clone, Copy)]
 pub(crate) struct Request<'a, const D: usize> {
     pub weights: &'a [f64],
     pub displacements: &'a Axes<D>,
 }
 
-/// Memory and answer of a regression.
+/// Working memory and result of a regression.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Regression<const D: usize> {
     gram: Vec<f64>,
     pub solution: Vec<[f64; D]>,
     weighted: Vec<f64>,
-    /// Stripe by stripe of rows, column by column.
+    /// Whitened columns, ordered by stripe of rows, then by column.
     whitened: Vec<Stripe>,
     /// `ln det(1 + LᵀWL/σ²)`.
     pub log_det: f64,
-    /// Displacements, one array an axis, padded like the prior's columns.
+    /// Displacements, one array per axis, padded like the columns of the prior.
     pub displacement: Axes<D>,
-    /// Their variances along one axis, once [`variances`](Self::variances) has been called.
+    /// Variances of the displacements along one axis, set by [`variances`](Self::variances).
     pub variance: Vec<f64>,
     noise: f64,
     rank: usize,
 }
 
 impl<const D: usize> Regression<D> {
-    /// Fits `targets` (displacements, one array an axis) with `weights`, both padded with zeros, at
-    /// noise variance `noise`, in the modes that are not lost in it: `O(I r² + r³)`.
+    /// Fits `targets` (displacements, one array per axis) with `weights`, both padded with zeros,
+    /// at the noise variance `noise`. Modes hidden by the noise are omitted. `O(I r² + r³)`.
     pub(crate) fn fit(&mut self, prior: &Prior, weights: &[f64], targets: &Axes<D>, noise: f64) {
         let r = prior.rank_beside(noise);
         (self.rank, self.noise) = (r, noise);
@@ -265,7 +264,7 @@ impl<const D: usize> Regression<D> {
             .sum();
     }
 
-    /// Sets displacement and variance of every padded row. No penalty, no determinant.
+    /// Sets displacement and variance of each padded row, for fits without penalty or determinant.
     pub(crate) fn set(&mut self, padded: usize, row: impl Fn(usize) -> ([f64; D], f64)) {
         self.solution.clear();
         self.whitened.clear();
@@ -281,8 +280,8 @@ impl<const D: usize> Regression<D> {
         }
     }
 
-    /// Computes the variances of the last fit: `O(I r²)`. Keeps what
-    /// [`covariance`](Self::covariance) needs if `with_covariances`.
+    /// Computes the variances of the last fit: `O(I r²)`. If `with_covariances`, keeps what
+    /// [`covariance`](Self::covariance) needs.
     pub(crate) fn variances(&mut self, prior: &Prior, with_covariances: bool) {
         let (r, stride, noise) = (self.rank, prior.stride, self.noise);
         let blocks = stride / LANES;
@@ -315,8 +314,8 @@ impl<const D: usize> Regression<D> {
         );
     }
 
-    /// Covariance of the displacements of two points, along one axis, after
-    /// [`variances`](Self::variances) with covariances: `O(r)`. None of rigid fits.
+    /// Covariance of the displacements of two points along one axis: `O(r)`. Requires a call of
+    /// [`variances`](Self::variances) with covariances. Rigid fits have no such covariance.
     pub(crate) fn covariance(&self, a: usize, b: usize) -> f64 {
         let rows = |i: usize| {
             let first = i / (TOGETHER * LANES) * self.rank;
@@ -326,7 +325,7 @@ impl<const D: usize> Regression<D> {
         self.noise * rows(a).zip(rows(b)).map(|(a, b)| a * b).sum::<f64>()
     }
 
-    /// `Σ |c|²`, twice the prior's energy of the warp.
+    /// `Σ |c|²`, twice the prior energy of the warp.
     pub(crate) fn penalty(&self) -> f64 {
         self.solution.iter().flatten().map(|c| c * c).sum()
     }

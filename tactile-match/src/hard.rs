@@ -1,4 +1,4 @@
-//! Pairs by distance alone: nearest neighbours and linear assignment.
+//! Pairing by distance alone: nearest neighbours and linear assignment.
 
 use crate::error::{point_sets, valid_distance};
 use crate::frame::{Frame, spread};
@@ -7,9 +7,9 @@ use crate::{Judgement, MatchError, Matching, PointMatcher, StopReason, linear_as
 use nalgebra::{DMatrix, Point, SVector};
 use tactile_tps::Smoothing;
 
-/// Both sets in one frame, with all squared distances between them.
+/// Both sets in a common frame, with all squared distances between them.
 struct Distances<const D: usize> {
-    /// The frame, for lengths.
+    /// The common frame, to convert lengths.
     frame: Frame<D>,
     target: Vec<SVector<f64, D>>,
     /// `|x_i − y_j|²`, `I × J`, in the units of the frame.
@@ -32,12 +32,12 @@ impl<const D: usize> Distances<D> {
         }
     }
 
-    /// The square of a length of the caller, in the units of the frame. Infinite for none.
+    /// The square of a length of the caller, in the units of the frame. Infinite for `None`.
     fn limit(&self, length: Option<f64>) -> f64 {
         length.map_or(f64::INFINITY, |l| (l / self.frame.scale).powi(2))
     }
 
-    /// Probabilities of the targets for model point `i`, its displacement being drawn from a normal
+    /// Probabilities of the targets for model point `i`, if its displacement has a normal
     /// distribution of variance `variance` along each axis.
     fn posterior(&self, i: usize, variance: f64) -> Vec<f64> {
         let row = self.squared.row(i);
@@ -58,8 +58,8 @@ impl<const D: usize> Distances<D> {
     }
 }
 
-/// The result for these pairs: the warp interpolates them, confidences and covariances come from
-/// how the displacements are distributed.
+/// Builds the result from these pairs. The warp interpolates them; confidences and covariances
+/// follow from the distribution of the displacements.
 fn matching<const D: usize>(
     model: &[Point<f64, D>],
     target: &[Point<f64, D>],
@@ -84,7 +84,7 @@ fn matching<const D: usize>(
         let places = distances.target.iter().copied().zip(p.iter().copied());
         let covariance = spread(places) * (scale * scale);
         found.displacement_covariance.push(covariance);
-        // Soft matches below this weight are left out.
+        // Soft matches below this weight are dropped.
         let kept = p.iter().copied().enumerate();
         let kept = kept.filter(|(_, p)| partner.is_some() && *p > 1e-4);
         found.soft.push_row(kept);
@@ -96,11 +96,11 @@ fn matching<const D: usize>(
     found
 }
 
-/// Gives every model point the target point nearest to it. Of several model points that want one
-/// target, the nearest has it.
+/// Pairs each model point with the nearest target point. If several model points share a nearest
+/// target, the closest of them gets it.
 ///
-/// Right while displacements are smaller than half the distance between points. The warp
-/// interpolates the pairs. `O(I J)`.
+/// The pairs are correct while displacements are smaller than half the distance between points. The
+/// warp interpolates the pairs. `O(I J)`.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -117,7 +117,7 @@ pub struct NearestNeighbour {
 }
 
 impl NearestNeighbour {
-    /// No pair further apart than `max_distance`, in the units of the points.
+    /// Excludes pairs further apart than `max_distance`, in the units of the points.
     ///
     /// # Errors
     /// [`MatchError::InvalidOption`] unless the distance is positive and finite.
@@ -153,7 +153,7 @@ impl<const D: usize> PointMatcher<D> for NearestNeighbour {
     }
 }
 
-/// The least of some distances, the first of equals.
+/// The smallest of the distances and its index, the first among equals.
 pub(crate) fn nearest(distances: impl Iterator<Item = f64>) -> (usize, f64) {
     distances.enumerate().fold(
         (0, f64::INFINITY),
@@ -161,10 +161,10 @@ pub(crate) fn nearest(distances: impl Iterator<Item = f64>) -> (usize, f64) {
     )
 }
 
-/// Pairs the sets so that the sum of squared distances is least, by [`linear_assignment`].
+/// Pairs the sets so that the sum of squared distances is smallest, by [`linear_assignment`].
 ///
-/// Unlike nearest neighbours it never leaves a point without a partner for another's sake, and a
-/// common translation of two sets of one size makes no difference. The warp interpolates the pairs.
+/// Unlike nearest neighbours, it pairs as many points as possible, and a common translation of two
+/// sets of equal size does not change the pairs. The warp interpolates the pairs.
 ///
 /// ```
 /// use nalgebra::{Point2, Vector2};
@@ -181,8 +181,8 @@ pub struct LinearAssignment {
 }
 
 impl LinearAssignment {
-    /// No pair further apart than `max_distance`, in the units of the points. Leaving two points
-    /// without partner costs as much as a pair at that distance.
+    /// Excludes pairs further apart than `max_distance`, in the units of the points. Leaving two
+    /// points unpaired costs as much as a pair at that distance.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -221,7 +221,7 @@ impl<const D: usize> PointMatcher<D> for LinearAssignment {
         point_sets(model, target)?;
         let distances = Distances::new(model, target);
         let limit = distances.limit(self.max_distance);
-        // nalgebra is column-major: the transpose in memory is row-major.
+        // nalgebra is column-major, so the transpose in memory is row-major.
         let costs: Vec<f64> = distances
             .squared
             .transpose()

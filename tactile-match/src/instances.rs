@@ -1,8 +1,8 @@
 //! The matchers in the plane and in space, compiled with this crate.
 //!
-//! Generic code is compiled anew in every crate that calls it, and the matchers are most of what
-//! the program, the Python package and a test compile. The generic methods below therefore take
-//! the compiled function of their dimension from a table.
+//! Generic code is compiled again in every crate that calls it, and the matchers are the largest
+//! part of what the program, the Python package and a test compile. The generic methods therefore
+//! look up the compiled function for their dimension in a table.
 
 use crate::softassign::SoftassignWorkspace;
 use crate::{
@@ -13,11 +13,11 @@ use nalgebra::Point;
 use std::any::Any;
 use std::ops::ControlFlow;
 
-/// The same function for points of the plane and of space.
+/// A pair of functions, one for points of the plane and one for points in space.
 struct Instances<F2, F3>(F2, F3);
 
 impl<F2: 'static, F3: 'static> Instances<F2, F3> {
-    /// The one that has this type.
+    /// The function for `dimension`.
     fn of<F: Copy + 'static>(&self, dimension: usize) -> Result<F, MatchError> {
         let all: [&dyn Any; 2] = [&self.0, &self.1];
         let found = all.iter().find_map(|instance| instance.downcast_ref());
@@ -59,7 +59,7 @@ static LABELLING: Both<RelaxationLabelling> =
     Instances(RelaxationLabelling::once, RelaxationLabelling::once);
 
 impl AnnealedSoftassign {
-    /// The search, compiled with this crate.
+    /// The search, instantiated in this crate.
     pub(crate) fn search_in<const D: usize>(
         &self,
         workspace: &mut SoftassignWorkspace<D>,

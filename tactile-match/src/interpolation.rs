@@ -1,20 +1,20 @@
-//! The warp of given pairs: a thin-plate spline, or what takes its place if they determine none.
+//! The warp of given pairs: a thin-plate spline, or a simpler map if the pairs determine none.
 
 use crate::error::usable;
 use nalgebra::Point;
 use tactile_tps::{Affine, Factorization, FitOptions, NegR, R2LogR, Smoothing, TpsError, Warp};
 
-/// The factorised thin-plate system of some sources: `r² ln r²` in the plane, `−r` in space.
+/// The factorised thin-plate system of fixed sources: `r² ln r²` in the plane, `−r` in space.
 #[derive(Clone, Debug)]
 enum System<const D: usize> {
     Plane(Box<Factorization<D, R2LogR>>),
     Space(Box<Factorization<D, NegR>>),
 }
 
-/// Interpolation between one set of sources and any images of them: factorised once.
+/// Interpolates from one set of sources to any images of it. The system is factorised once.
 #[derive(Clone, Debug)]
 pub(crate) struct Interpolation<const D: usize> {
-    /// None where the sources determine no spline.
+    /// `None` if the sources determine no spline.
     system: Option<System<D>>,
     weights: Option<Vec<f64>>,
     smoothing: Smoothing,
@@ -53,8 +53,8 @@ impl<const D: usize> Interpolation<D> {
         }
     }
 
-    /// The spline through these pairs. An affine map where they determine none, the identity where
-    /// there are none.
+    /// The spline through these pairs. It becomes an affine map if the pairs determine no spline,
+    /// and the identity if there are no pairs.
     pub(crate) fn through(
         &self,
         sources: &[Point<f64, D>],
@@ -80,8 +80,8 @@ impl<const D: usize> Interpolation<D> {
     }
 }
 
-/// The warp of weighted pairs: a spline smoothed by cross-validation, an affine map for few of
-/// them, a rigid motion for fewer, the identity for none.
+/// The warp of weighted pairs: a spline smoothed by cross-validation, an affine map for few pairs,
+/// a rigid motion for fewer, the identity for none.
 pub(crate) fn fitted<const D: usize>(
     sources: &[Point<f64, D>],
     images: &[Point<f64, D>],
@@ -108,8 +108,8 @@ pub(crate) fn spline<const D: usize>(
     Interpolation::new(sources, weights, smoothing).through(sources, images)
 }
 
-/// The spline through these pairs and where it takes the model. Where that is beyond what can be
-/// squared, the affine map, or none.
+/// The spline through these pairs and the images of the model under it. If an image is too large to
+/// be squared, the affine map takes the spline's place, or no map at all.
 pub(crate) fn through<const D: usize>(
     model: &[Point<f64, D>],
     sources: &[Point<f64, D>],
@@ -134,8 +134,8 @@ pub(crate) fn through<const D: usize>(
     (Box::new(Affine::default()), model.to_vec())
 }
 
-/// Whether a warp takes the sources to these images, to a share of the size: where sources nearly
-/// coincide and their images do not, no digit is left in a spline.
+/// Whether a warp maps the sources to these images, relative to their size. A spline loses all
+/// digits if sources nearly coincide and their images do not.
 pub(crate) fn follows<const D: usize>(
     warp: &(dyn Warp<D> + Send + Sync),
     sources: &[Point<f64, D>],
@@ -143,7 +143,7 @@ pub(crate) fn follows<const D: usize>(
     share: f64,
 ) -> bool {
     let size = images.iter().fold(0.0_f64, |m, p| m.max(p.coords.amax()));
-    // All at once: a spline samples points several at a time.
+    // All points in one call, since a spline evaluates several points at a time.
     let mut found = sources.to_vec();
     warp.apply_into(sources, &mut found).is_ok()
         && found.iter().zip(images).all(|(found, image)| {

@@ -1,11 +1,11 @@
-//! Whether the pairs of an answer are to be relied on: doubts with their names, and the judgement of
-//! pairs that come without a likelihood.
+//! Whether the pairs of an answer are reliable: named doubts, and a judgement of pairs that come
+//! without a likelihood.
 
 use crate::frame::centre_and_radius;
 use nalgebra::{Point, SMatrix, SVector};
 use tactile_core::statistics::median;
 
-/// Why the pairs of an answer are not to be relied on.
+/// Why the pairs of an answer are not reliable.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -19,7 +19,7 @@ use tactile_core::statistics::median;
 /// let matcher = AnnealedSoftassign::default();
 /// let same = matcher.match_points(&scattered(0.1), &scattered(0.1))?;
 /// assert_eq!(same.report.doubt(), None);
-/// // Two sets that have nothing to do with each other: some points coincide by chance.
+/// // Two unrelated sets: some points coincide by chance.
 /// let other = matcher.match_points(&scattered(0.1), &scattered(0.37))?;
 /// assert!(matches!(
 ///     other.report.doubt(),
@@ -35,30 +35,30 @@ use tactile_core::statistics::median;
     serde(rename_all = "snake_case")
 )]
 pub enum Doubt {
-    /// So few points of the smaller set have a partner that the pairs may have met by chance.
+    /// Few points of the smaller set have a partner, so the pairs may be chance coincidences.
     FewPairs,
-    /// The residuals are so large that points strewn at random would explain the targets nearly as
-    /// well. Or those of a part of the set are far larger than the others', which may lie a point
-    /// aside.
+    /// The residuals are so large that randomly scattered points would fit the targets nearly as
+    /// well. Alternatively, part of the set has far larger residuals than the rest and may be
+    /// shifted by one point.
     LargeResiduals,
-    /// More than one pair in ten may be wrong, by the pairs' confidences, by the points without a
-    /// partner, and by the residuals.
+    /// More than one pair in ten may be wrong, judged by the confidences, the unpaired points and
+    /// the residuals.
     Undecided,
-    /// Any rotation is allowed, and one of a twelfth of a turn or a multiple, in space of a right
-    /// angle about an axis of the coordinates, takes the model onto itself: the answer may be
-    /// turned by it.
+    /// All rotations are allowed and the model is symmetric: a multiple of 30° (in space: 90° about
+    /// a coordinate axis) maps it onto itself. The answer may be off by that rotation.
     Symmetric,
-    /// The points are those of a lattice that may go on beyond the view. Moved by one of its steps
-    /// they explain the targets as well, with a motion that is not much larger: state the largest
+    /// The points form a lattice that may continue outside the view. Shifted by one lattice step,
+    /// they fit the targets equally well with a motion that is not much larger. To exclude it, set
+    /// the largest motion
     /// motion ([`AnnealedSoftassign::with_largest_motion`](crate::AnnealedSoftassign)).
     Repeats {
-        /// The step, in the units of the points. In the plane the last number is zero.
+        /// The lattice step in the units of the points. In the plane the last component is zero.
         step: [f64; 3],
     },
-    /// The model turned by a large angle explains the targets better, and such turns are excluded.
+    /// The model rotated by a large angle fits the targets better, but such rotations are excluded.
     Turned,
-    /// A mirror image of the model explains the targets better: columns may be exchanged, or a sign
-    /// changed.
+    /// A mirror image of the model fits the targets better: two columns may be exchanged or a sign
+    /// reversed.
     Mirrored,
 }
 
@@ -66,22 +66,24 @@ impl std::fmt::Display for Doubt {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Repeats { step } => return write_repeats(f, step),
-            Self::FewPairs => "the matched points are so few that they may have met by chance",
+            Self::FewPairs => "so few points match that the pairs may be chance coincidences",
             Self::LargeResiduals => {
                 "the residuals of the match are as large as those of scattered points"
             }
             Self::Undecided => "more than one matched pair in ten may be wrong",
-            Self::Symmetric => "the points look the same after a turn, and any rotation is allowed",
-            Self::Turned => "turned by a large angle the points match better: allow any rotation",
+            Self::Symmetric => {
+                "the points are symmetric under a rotation, and any rotation is allowed"
+            }
+            Self::Turned => "the points match better after a large rotation: allow any rotation",
             Self::Mirrored => {
                 "a mirror image of the points matches better: are columns of the second set \
-                 exchanged, or a sign changed?"
+                 exchanged, or is a sign reversed?"
             }
         })
     }
 }
 
-/// Whether the pairs of an answer are to be relied on.
+/// Whether the pairs of an answer are reliable.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -89,10 +91,10 @@ impl std::fmt::Display for Doubt {
 /// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4]].map(Point2::from);
 /// let judged = AnnealedSoftassign::default().match_points(&model, &model)?;
 /// assert_eq!(judged.report.judgement, Judgement::Sure);
-/// // A nearest neighbour exists for any two sets. Of few pairs alone nothing can be seen.
+/// // A nearest neighbour exists for any two sets. Too few pairs cannot be judged.
 /// let paired = NearestNeighbour::default().match_points(&model, &model)?;
 /// assert_eq!(paired.report.judgement, Judgement::NotJudged);
-/// // Of more it shows whether neighbours move together.
+/// // With more pairs, the motions of neighbours can be compared.
 /// let scattered = |seed: f64| -> Vec<Point2<f64>> {
 ///     let place = |i: i32, k: f64| (f64::from(i * i) * k + seed * f64::from(i)).fract();
 ///     (0..60)
@@ -110,16 +112,16 @@ impl std::fmt::Display for Doubt {
     serde(rename_all = "snake_case")
 )]
 pub enum Judgement {
-    /// The pairs were given by the caller, or are too few to show whether neighbours move together.
+    /// The pairs were given by the caller, or are too few to compare the motions of neighbours.
     #[default]
     NotJudged,
-    /// Nothing speaks against the pairs.
+    /// No check raised a doubt.
     Sure,
-    /// Something does.
+    /// A check raised this doubt.
     Doubtful(Doubt),
 }
 
-/// The step of a lattice, along an axis where it lies within three degrees of one.
+/// Writes the step of a lattice, by axis if it is within three degrees of one.
 fn write_repeats(f: &mut std::fmt::Formatter<'_>, step: &[f64; 3]) -> std::fmt::Result {
     let length = step.iter().map(|s| s * s).sum::<f64>().sqrt();
     let [x, y, z] = step.map(|s| s / length);
@@ -131,47 +133,49 @@ fn write_repeats(f: &mut std::fmt::Formatter<'_>, step: &[f64; 3]) -> std::fmt::
     };
     write!(
         f,
-        "the points repeat every {length:.4} along {along}: motions beyond {:.4} cannot be told \
-         without a largest motion",
+        "the points repeat every {length:.4} along {along}: motions beyond {:.4} are ambiguous \
+         unless a largest motion is set",
         0.5 * length
     )
 }
 
 // Pairs alone: do neighbours move together?
 //
-// Right pairs follow a field that is smooth over a few points. Wrong ones are off by distances of
-// the order of the spacing, whatever found them. So each motion is predicted from those of its
+// Correct pairs follow a field that is smooth over a few points. Wrong pairs are off by distances
+// of the order of the spacing, whatever method found them. So each motion is predicted from its
 // neighbours, by an affine field through the two thirds that agree best, and the median misfit is
-// held against the spacing. The likelihood of the default matcher sees more, and judges its
-// answers.
+// compared with the spacing. The default matcher judges its answers by their likelihood instead,
+// which is more sensitive.
 
-/// Neighbours that a motion is predicted from, a dimension: more bend within their reach, fewer
-/// leave nothing to leave out.
+/// Number of neighbours that predict a motion, per dimension. More neighbours would reach over more
+/// of the bending; fewer would leave no margin to drop outliers.
 const NEIGHBOURS: usize = 6;
-/// Share of them that is kept.
+/// Fraction of the neighbours that is kept.
 const AGREEING: f64 = 0.67;
-/// Pairs that are looked at: the median of so many is known to a twentieth.
+/// Number of pairs examined: enough to estimate the median to a twentieth.
 const SAMPLE: usize = 500;
-/// Least share of the smaller set that is paired.
+/// Minimum paired fraction of the smaller set.
 const LEAST_PAIRED: f64 = 0.55;
-/// Noise, in typical distances of a target from the next, beyond which too many points trade
-/// places: chance leaves 0.3 of a lattice and 0.8 of random points. More would be silent on lattices,
-/// less doubts noise of a fifth of the spacing (`--example judgement`).
+/// Noise, in typical nearest-neighbour distances of the targets, above which too many points swap
+/// places. Chance gives 0.3 on a lattice and 0.8 for random points. A larger limit would miss
+/// lattices; a smaller one would doubt noise of a fifth of the spacing (`--example judgement`).
 const MOST_NOISE: f64 = 0.25;
-/// Misfits beyond so many deviations, and so many spacings, are of pairs that are off.
+/// A pair is off if its misfit exceeds this number of standard deviations and this number of
+/// spacings.
 const OFF: [f64; 2] = [4.0, 0.3];
-/// Largest share of those.
+/// Maximum fraction of such pairs.
 const MOST_OFF: f64 = 0.08;
-/// A step takes so large a share of a lattice's points near another one, edges left out.
+/// A lattice step takes at least this fraction of the points, without the edges, near another
+/// point.
 const REPEATED: f64 = 0.65;
-/// Near, in steps.
+/// "Near" in units of the step.
 const NEAR_STEP: f64 = 0.2;
-/// Steps up to so many times the shortest are looked at: the diagonal of a square.
+/// Steps up to this multiple of the shortest are examined, which includes the diagonal of a square.
 const LONGEST_STEP: f64 = 1.6;
-/// A step away, so many times the motion is out of reach.
+/// A step is out of reach if it exceeds this multiple of the motion.
 const REACH: f64 = 5.0;
-/// Sets of which such a share is paired are the same points, not two views of more, if the box that
-/// they fill has changed by such a share of a step.
+/// Two sets hold the same points, rather than two views of more, if this fraction of them is paired
+/// and their bounding box has changed by more than this fraction of a step.
 const WHOLE: [f64; 2] = [0.995, 0.25];
 
 impl Judgement {
@@ -211,8 +215,8 @@ impl Judgement {
 
 type Motions<const D: usize> = [(SVector<f64, D>, SVector<f64, D>)];
 
-/// Squared distance of a motion from what its neighbours predict, over the variance of that
-/// difference at unit noise. `None` if there are too few of them.
+/// Squared distance of a motion from the prediction of its neighbours, over the variance of that
+/// difference at unit noise. `None` if there are too few neighbours.
 fn misfit<const D: usize>(pairs: &Motions<D>, row: usize) -> Option<f64> {
     let count = NEIGHBOURS * D;
     let (at, motion) = pairs[row];
@@ -243,7 +247,7 @@ fn misfit<const D: usize>(pairs: &Motions<D>, row: usize) -> Option<f64> {
         gram += (x - mean) * (x - mean).transpose();
         outer += (u - moved) * (x - mean).transpose();
     }
-    // Points on a line have no gradient across it.
+    // Points on a line determine no gradient across it.
     gram += SMatrix::identity() * (1e-3 * gram.trace());
     let inverse = gram.try_inverse()?;
     let arm = at - mean;
@@ -252,8 +256,8 @@ fn misfit<const D: usize>(pairs: &Motions<D>, row: usize) -> Option<f64> {
     Some(left.norm_squared() / variance)
 }
 
-/// The step of a lattice after which the answer explains the targets as well, with a motion that is
-/// not much larger.
+/// The lattice step by which the answer can be shifted so that it fits the targets equally well,
+/// with a motion that is not much larger.
 fn repeats<const D: usize>(
     model: &[Point<f64, D>],
     target: &[Point<f64, D>],
@@ -299,7 +303,7 @@ fn repeats<const D: usize>(
     Some(Doubt::Repeats { step: outward })
 }
 
-/// Median distance from a target to the next, over a sample.
+/// Median nearest-neighbour distance of the targets, over a sample.
 fn typical_spacing<const D: usize>(target: &[Point<f64, D>]) -> f64 {
     let step = target.len().div_ceil(SAMPLE);
     let nearest = |i: usize| {
@@ -313,7 +317,7 @@ fn typical_spacing<const D: usize>(target: &[Point<f64, D>]) -> f64 {
 }
 
 /// Median of the sum of `dimension` squared standard normal deviates, by the approximation of
-/// Wilson and Hilferty (to 1 % from 2 on).
+/// Wilson and Hilferty (accurate to 1 % from two dimensions on).
 pub(crate) fn median_of_chi_squared(dimension: usize) -> f64 {
     let n = dimension as f64;
     n * (1.0 - 2.0 / (9.0 * n)).powi(3)

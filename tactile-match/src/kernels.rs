@@ -1,28 +1,27 @@
 //! Dense kernels on padded columns: normal equations, Cholesky factors, combinations of columns.
 
-/// Columns are padded with zeros to a multiple of this, so that they are whole vectors.
+/// Columns are padded with zeros to a multiple of this length, so that they consist of whole SIMD
+/// vectors.
 pub(crate) const LANES: usize = 8;
 
-// Dense kernels on padded columns: normal equations, their Cholesky factor, combinations of the
-// columns, whitened columns.
-//
-// All sum in the order of the plain loops: several columns or rows at a time only share the loads
-// and hide the latency of the additions.
+// All kernels sum in the order of the plain loops. Several columns or rows are processed together
+// only to share loads and to hide the latency of the additions.
 
 pub(crate) type Block = [f64; LANES];
-/// A column's values for the rows that are whitened together.
+/// Values of a column for the rows that are whitened together.
 pub(crate) type Stripe = [Block; TOGETHER];
 
-/// Columns or rows worked at a time: their running sums stay in registers.
+/// Number of columns or rows processed together: their running sums stay in registers.
 pub(crate) const TOGETHER: usize = 4;
 
-/// Rows of all columns worked at a time: half a megabyte, so that they stay near the processor
-/// while every column meets every other. All at once, sets of 100,000 points take three times as
-/// long.
+/// Number of rows of all columns processed together: half a megabyte, so that they stay in cache
+/// while each column is multiplied with each other. Without tiles, sets of 100,000 points take
+/// three times as long.
 const TILE: usize = 1024;
 
-/// The lower triangle of `AᵀWA` into `gram`, row by row, and `AᵀWz` into `moments`, for `count`
-/// columns of A and the `D` columns of z: `O(I count²)`. `weighted` is memory for one column.
+/// Writes the lower triangle of `AᵀWA` into `gram`, row by row, and `AᵀWz` into `moments`, for the
+/// `count` columns of A and the `D` columns of z: `O(I count²)`. `weighted` is memory for one
+/// column.
 #[inline(always)]
 pub(crate) fn normal_equations<'a, const D: usize>(
     column: impl Fn(usize) -> &'a [f64],
@@ -75,7 +74,7 @@ fn add<const N: usize>(sums: &mut [f64; N], terms: [f64; N]) {
     }
 }
 
-/// Dot products of `a` with each of `b`.
+/// Dot products of `a` with each column of `b`.
 #[inline(always)]
 fn dots<const N: usize>(a: &[f64], b: [&[f64]; N]) -> [f64; N] {
     let a = a.as_chunks::<LANES>().0;
@@ -94,7 +93,7 @@ fn dots<const N: usize>(a: &[f64], b: [&[f64]; N]) -> [f64; N] {
     totals(sums)
 }
 
-/// Sums of the lanes, half and half. Not inlined: the compiler would else arrange the running sums
+/// Sums of the lanes by halves. It is not inlined: otherwise the compiler arranges the running sums
 /// for these few additions rather than for the loop before.
 #[inline(never)]
 fn totals<const L: usize, const N: usize>(sums: [[f64; L]; N]) -> [f64; N] {
@@ -113,7 +112,7 @@ fn totals<const L: usize, const N: usize>(sums: [[f64; L]; N]) -> [f64; N] {
     totals
 }
 
-/// `u = Σ cₚ aₚ` for the columns `a` and one coefficient a column and axis.
+/// `u = Σ cₚ aₚ` for the columns `a`, with one coefficient per column and axis.
 #[inline(always)]
 pub(crate) fn combine<'a, const D: usize>(
     column: impl Fn(usize) -> &'a [f64],
@@ -157,8 +156,8 @@ fn combine_blocks<'a, const B: usize, const D: usize>(
     }
 }
 
-/// `A L⁻ᵀ` of the rows of one stripe into `whitened`, for the lower Cholesky factor L of `count`
-/// columns: `O(count²)`. Blocks beyond the last are not set.
+/// Writes `A L⁻ᵀ` of the rows of one stripe into `whitened`, for the lower Cholesky factor L of
+/// `count` columns: `O(count²)`. Blocks beyond the last are not written.
 #[inline(always)]
 pub(crate) fn whiten(
     columns: &[Block],
@@ -177,8 +176,8 @@ pub(crate) fn whiten(
     }
 }
 
-/// So many blocks of a stripe from the one at `at`. Their number is known to the compiler: it would
-/// else work them number by number.
+/// Whitens `B` blocks of a stripe, starting at `at`. `B` is a constant so that the compiler
+/// vectorises over the blocks.
 #[inline(always)]
 fn whiten_blocks<const B: usize>(
     columns: &[Block],
@@ -211,8 +210,8 @@ fn whiten_blocks<const B: usize>(
     }
 }
 
-/// Cholesky factor in place of the lower triangle. The diagonal carries σ², so that pivots stay
-/// positive. Rounding is caught by a floor.
+/// Overwrites the lower triangle with the Cholesky factor. The diagonal contains σ², so pivots stay
+/// positive; a floor guards against rounding.
 #[inline(always)]
 pub(crate) fn cholesky(a: &mut [f64], n: usize) {
     let mut first = 0;
@@ -226,7 +225,7 @@ pub(crate) fn cholesky(a: &mut [f64], n: usize) {
     }
 }
 
-/// Rows `first..first + R` of the factor from the rows above.
+/// Computes rows `first..first + R` of the factor from the rows above.
 #[inline(always)]
 fn eliminate<const R: usize>(a: &mut [f64], n: usize, first: usize) {
     let (above, below) = a.split_at_mut(first * n);
@@ -254,7 +253,8 @@ fn eliminate<const R: usize>(a: &mut [f64], n: usize, first: usize) {
     }
 }
 
-/// Dot products of `a` with each of `b`, with four running sums each. The remainder one by one.
+/// Dot products of `a` with each column of `b`, with four running sums each. The remainder is
+/// summed one by one.
 #[inline(always)]
 fn short_dots<const N: usize>(a: &[f64], b: [&[f64]; N]) -> [f64; N] {
     let whole = a.len() / 4;

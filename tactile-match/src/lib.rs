@@ -2,15 +2,15 @@
 //!
 //! # Methods
 //! The default, [`AnnealedSoftassign`], alternates a soft assignment and a smooth warp while a
-//! temperature falls. The warp has a Gaussian-process prior, and distances are taken from its
-//! leave-one-out predictions. Relaxation labelling is one of the starts it tries where the first
-//! does not settle the matter. The paper's own method, relaxation labelling (13)–(20) with a
-//! thin-plate spline (21)–(24), is [`RelaxationLabelling`]:
+//! temperature falls. The warp has a Gaussian-process prior, and distances are computed from its
+//! leave-one-out predictions. If the first start leaves the match undecided, further starts follow;
+//! relaxation labelling is one of them. The paper's own method, relaxation labelling (13)–(20) with
+//! a thin-plate spline (21)–(24), is [`RelaxationLabelling`]:
 //! `RelaxationLabelling::default().match_points(&model, &target)`.
 //!
 //! # Equations
-//! Match matrix $M$ of I model points $y_i$ and J target points $t_j$, with slack. Numbers are the
-//! paper's.
+//! Match matrix $M$ of I model points $y_i$ and J target points $t_j$, with slack. The equation
+//! numbers are those of the paper.
 //!
 //! - Rows and columns sum to one with their slack: $\sum_j M_{ij} = 1$ and $\sum_i M_{ij} = 1$.
 //! - Soft assignment at the temperature $\sigma$: $M_{ij} \propto \exp(-|y_i - t_j|^2/2\sigma^2)$,
@@ -22,9 +22,10 @@
 //!   the support $S_{ij} = \sum_a \sum_b M_{ab} \alpha \beta \gamma$ of neighbours a of i and b of
 //!   j. Densely O(IJAB), over few candidates one product a link.
 //!
-//! Lengths are in any unit. Errors are [`MatchError`], not converging is a [`MatchReport`].
+//! Lengths are in any unit. Errors are [`MatchError`]; a run that does not converge is reported in
+//! [`MatchReport`].
 #![forbid(unsafe_code)]
-// Several arrays share one index; zipping them all hides it.
+// Several arrays share one index, and zipping them all hides it.
 #![allow(clippy::needless_range_loop)]
 
 mod assignment;
@@ -47,7 +48,7 @@ mod shape_context;
 mod softassign;
 mod transformation;
 
-// The shared tests name the crate from outside.
+// The shared tests refer to the crate by its external name.
 #[cfg(test)]
 extern crate self as tactile_match;
 

@@ -1,4 +1,4 @@
-//! What every matcher takes and returns: [`PointMatcher`], [`Matching`] and its [`MatchReport`].
+//! The interface of every matcher: [`PointMatcher`], [`Matching`] and its [`MatchReport`].
 
 use crate::error::{option_within, point_sets};
 use crate::interpolation::fitted;
@@ -8,10 +8,10 @@ use std::ops::Deref;
 use tactile_core::StopReason;
 use tactile_tps::{SeriesMemory, Warp};
 
-/// Finds which model point is which target point, and the warp that takes the model onto the
-/// target.
+/// Finds which model point corresponds to which target point, and the warp that maps the model onto
+/// the target.
 ///
-/// Object safe, so that a user picks the method at run time:
+/// The trait is object safe, so that the method can be chosen at run time:
 /// `let matcher: Box<dyn PointMatcher<2>> = …`.
 ///
 /// ```
@@ -51,9 +51,9 @@ pub trait PointMatcher<const D: usize>: Send + Sync {
         target: &[Point<f64, D>],
     ) -> Result<Matching<D>, MatchError>;
 
-    /// As [`match_points`](Self::match_points), for the next target of a series: a matcher may
-    /// begin where its last match of the same model ended, with what it keeps in `warm`
-    /// ([`WarmStart`]). By default the match is made anew.
+    /// Like [`match_points`](Self::match_points), for the next target of a series. A matcher may
+    /// start from its last match of the same model, with the state in `warm` ([`WarmStart`]). The
+    /// default implementation starts anew.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -68,7 +68,7 @@ pub trait PointMatcher<const D: usize>: Send + Sync {
     /// ```
     ///
     /// # Errors
-    /// As [`match_points`](Self::match_points).
+    /// Those of [`match_points`](Self::match_points).
     fn match_next(
         &self,
         warm: &mut WarmStart,
@@ -79,9 +79,9 @@ pub trait PointMatcher<const D: usize>: Send + Sync {
         self.match_points(model, target)
     }
 
-    /// As [`match_next`](Self::match_next), for who asks for the pairs alone: a matcher may leave
-    /// out what else a [`Matching`] holds, and then allocates nothing once `warm` and `pairs` have
-    /// grown. By default it is the match's.
+    /// Like [`match_next`](Self::match_next), for callers that need only the pairs. A matcher may
+    /// skip the other parts of a [`Matching`]; it then allocates nothing once `warm` and `pairs`
+    /// have grown. The default implementation calls `match_next`.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -109,7 +109,7 @@ pub trait PointMatcher<const D: usize>: Send + Sync {
     /// ```
     ///
     /// # Errors
-    /// As [`match_points`](Self::match_points). `pairs` is then as it was.
+    /// Those of [`match_points`](Self::match_points). `pairs` is then unchanged.
     fn match_next_pairs(
         &self,
         warm: &mut WarmStart,
@@ -139,15 +139,15 @@ pub trait PointMatcher<const D: usize>: Send + Sync {
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct MatchedPairs {
-    /// Target row of every model point.
+    /// Target row of each model point.
     pub assignment: Vec<Option<usize>>,
-    /// As [`Matching::confidence`].
+    /// Confidence of each model point, see [`Matching::confidence`].
     pub confidence: Vec<f64>,
-    /// How it went.
+    /// Report of the match.
     pub report: MatchReport,
 }
 
-/// Boxed, shared and borrowed matchers.
+/// Implements the trait for boxed, shared and borrowed matchers.
 impl<const D: usize, P: Deref<Target: PointMatcher<D>> + Send + Sync> PointMatcher<D> for P {
     fn match_points(
         &self,
@@ -177,7 +177,7 @@ impl<const D: usize, P: Deref<Target: PointMatcher<D>> + Send + Sync> PointMatch
     }
 }
 
-/// How a match went.
+/// Report of a match.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -193,11 +193,11 @@ impl<const D: usize, P: Deref<Target: PointMatcher<D>> + Send + Sync> PointMatch
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct MatchReport {
-    /// Why it stopped.
+    /// Why the matcher stopped.
     pub stop: StopReason,
-    /// Outer iterations (match, then warp) of the start that won.
+    /// Outer iterations (match, then warp) of the start with the best energy.
     pub iterations: usize,
-    /// Starts that were tried.
+    /// Number of starts that were tried.
     pub starts: usize,
     /// Root mean square distance between warped model points and their partners, in the units of
     /// the points.
@@ -205,14 +205,14 @@ pub struct MatchReport {
     /// Estimated standard deviation of the position noise along one axis, in the units of the
     /// points.
     pub sigma: f64,
-    /// Whether the pairs are to be relied on.
+    /// Whether the pairs are reliable.
     #[cfg_attr(feature = "serde", serde(default))]
     pub judgement: Judgement,
 }
 
 impl MatchReport {
-    /// Why the pairs are not to be relied on. `None` if nothing speaks against them or the matcher
-    /// does not judge them: see [`judgement`](Self::judgement).
+    /// Why the pairs are not reliable. `None` if no check raised a doubt or the matcher does not
+    /// judge its pairs: see [`judgement`](Self::judgement).
     #[must_use]
     pub fn doubt(&self) -> Option<Doubt> {
         match self.judgement {
@@ -222,7 +222,7 @@ impl MatchReport {
     }
 }
 
-/// The answer of a [`PointMatcher`].
+/// The result of a [`PointMatcher`].
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -238,40 +238,41 @@ impl MatchReport {
 /// ```
 #[non_exhaustive]
 pub struct Matching<const D: usize> {
-    /// The warp. It takes the model points to [`warped`](Self::warped), of a model of four thousand
-    /// points and more a sample of them.
+    /// The warp. It maps the model points to [`warped`](Self::warped); for models of four thousand
+    /// points and more this holds for a sample of them.
     pub warp: Box<dyn Warp<D> + Send + Sync>,
     /// The warped model points.
     pub warped: Vec<Point<f64, D>>,
-    /// Target row of every model point. `None` for a point without a partner. No target row occurs
+    /// Target row of each model point. `None` for a point without a partner. No target row occurs
     /// twice.
     pub assignment: Vec<Option<usize>>,
-    /// Probability that the assignment (or the lack of one) of each model point is right, in [0,
-    /// 1]. Of the default matcher and noisy points: of all pairs given a confidence c, a share c is
-    /// right, within some five points above 0.6 and thirteen below, over bent, cropped, turned and
-    /// stretched scenes that were not tuned on (`--example confidence`).
+    /// Probability in [0, 1] that the assignment of each model point (or its lack of one) is
+    /// correct. For the default matcher and noisy points: of all pairs with confidence c, a
+    /// fraction c is correct, within about five percentage points above 0.6 and thirteen below.
+    /// This was measured on bent, cropped, rotated and stretched scenes that were not used for
+    /// tuning (`--example confidence`).
     pub confidence: Vec<f64>,
-    /// The soft matches M the assignment was read from.
+    /// The soft matches M from which the assignment was derived.
     pub soft: SoftMatches,
     /// Model rows without a partner, ascending.
     pub unmatched_model: Vec<usize>,
     /// Target rows without a partner, ascending.
     pub unmatched_target: Vec<usize>,
-    /// Covariance of each model point's position under the warp, in squared units of the points. Of
-    /// the default matcher it is the posterior covariance given that the pairs are right: about 68
-    /// % of the true positions lie within one standard deviation along an axis.
+    /// Covariance of each model point's position under the warp, in squared units of the points.
+    /// For the default matcher it is the posterior covariance if the pairs are correct: about 68 %
+    /// of the true positions lie within one standard deviation along an axis.
     pub displacement_covariance: Vec<SMatrix<f64, D, D>>,
-    /// The map that was found, of a matcher that was asked for one of a few parameters.
+    /// The fitted map, if the matcher was configured for one of a few parameters.
     pub transformation: Option<FittedTransformation<D>>,
-    /// The matcher's energy after every outer iteration.
+    /// Energy of the matcher after each outer iteration.
     pub energy: Vec<f64>,
-    /// How it went.
+    /// Report of the match.
     pub report: MatchReport,
 }
 
 impl<const D: usize> Matching<D> {
-    /// The match of an assignment, under a warp that takes the model to `warped`. No soft matches,
-    /// confidences and covariances yet.
+    /// The match of an assignment whose warp maps the model to `warped`. Soft matches, confidences
+    /// and covariances are still empty.
     pub(crate) fn new(
         target: &[Point<f64, D>],
         warp: Box<dyn Warp<D> + Send + Sync>,
@@ -307,14 +308,14 @@ impl<const D: usize> Matching<D> {
         }
     }
 
-    /// The match of these pairs, each (model row, target row, confidence in [0, 1]), as a matcher
-    /// of your own may return it.
+    /// Builds the match from pairs of (model row, target row, confidence in [0, 1]), for example in
+    /// a user-defined matcher.
     ///
-    /// The warp is a thin-plate spline smoothed by cross-validation where there are three times as
-    /// many pairs as coefficients of an affine map along an axis, an affine map for fewer, and a
-    /// rigid motion for D or fewer. Pairs weigh as their confidences. The covariance of every
-    /// warped point is that of the weighted residuals of the pairs. Model points without a pair
-    /// have confidence zero. O(n³) for up to 3000 pairs.
+    /// The warp is a thin-plate spline smoothed by cross-validation if there are at least three
+    /// times as many pairs as coefficients of an affine map along an axis. With fewer pairs it is
+    /// an affine map, and with D or fewer a rigid motion. Pairs are weighted by their confidences.
+    /// The covariance of each warped point is that of the weighted residuals of the pairs. Model
+    /// points without a pair have confidence zero. O(n³) for up to 3000 pairs.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -355,7 +356,7 @@ impl<const D: usize> Matching<D> {
         }
         let sources: Vec<_> = pairs.iter().map(|&(i, _, _)| model[i]).collect();
         let images: Vec<_> = pairs.iter().map(|&(_, j, _)| target[j]).collect();
-        // A confidence of zero would take the pair out of the fit.
+        // A confidence of zero would remove the pair from the fit.
         let weights: Vec<f64> = pairs.iter().map(|&(_, _, c)| c.max(1e-3)).collect();
         let warp = fitted(&sources, &images, weights.clone());
         let warped: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
@@ -372,7 +373,7 @@ impl<const D: usize> Matching<D> {
         Ok(found)
     }
 
-    /// The pairs, each (model row, target row, confidence), by rising model row.
+    /// The pairs as (model row, target row, confidence), in ascending order of the model row.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -388,9 +389,9 @@ impl<const D: usize> Matching<D> {
     }
 }
 
-/// The match matrix `M` without its slack row and column, in compressed rows: for every model point
-/// the target points that keep some probability, and how much. What a row lacks to one is its
-/// probability of having no partner.
+/// The match matrix `M` without its slack row and column, in compressed rows: each model point has
+/// the target points with non-negligible probability, and these probabilities. One minus the sum of
+/// a row is the probability that the point has no partner.
 ///
 /// ```
 /// use tactile_match::SoftMatches;
@@ -418,7 +419,8 @@ impl Default for SoftMatches {
 }
 
 impl<R: IntoIterator<Item = (usize, f64)>> FromIterator<R> for SoftMatches {
-    /// The matrix of these rows, each the target points of one model point with their weights.
+    /// Builds the matrix from its rows, each with the target points of one model point and their
+    /// weights.
     fn from_iter<I: IntoIterator<Item = R>>(rows: I) -> Self {
         let mut soft = Self::default();
         rows.into_iter().for_each(|row| soft.push_row(row));
@@ -442,7 +444,7 @@ impl SoftMatches {
         self.starts.len() - 1
     }
 
-    /// The target rows and weights of model point `row`. Nothing for a row that does not exist.
+    /// The target rows and weights of model point `row`. Empty for a row that does not exist.
     pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let range = match (self.starts.get(row), self.starts.get(row + 1)) {
             (Some(&start), Some(&end)) => start..end,
@@ -455,11 +457,11 @@ impl SoftMatches {
     }
 }
 
-/// Memory of one matcher along a series of targets of one model, for
+/// State of one matcher along a series of targets of one model, for
 /// [`PointMatcher::match_next`](crate::PointMatcher::match_next).
 ///
-/// What is in it belongs to the matcher: a matcher of your own asks for its own type with
-/// [`state`](Self::state). A matcher that finds the state of another one starts cold.
+/// The content belongs to the matcher: a user-defined matcher gets a value of its own type from
+/// [`state`](Self::state). A matcher that finds the state of another type starts anew.
 ///
 /// ```
 /// use nalgebra::Point3;
@@ -487,13 +489,13 @@ impl SoftMatches {
 pub struct WarmStart(SeriesMemory);
 
 impl WarmStart {
-    /// The state of type `S` that the last match left here. A default one where there is none, or
-    /// one of another type.
+    /// The state of type `S` that the last match left here. Returns the default if there is none,
+    /// or if it has another type.
     ///
     /// ```
     /// use nalgebra::Point2;
     /// use tactile_match::{MatchError, Matching, NearestNeighbour, PointMatcher, WarmStart};
-    /// /// Nearest neighbours of where the model came to lie last.
+    /// /// Nearest neighbours of the model's last positions.
     /// struct Follower;
     /// impl PointMatcher<2> for Follower {
     ///     fn match_points(

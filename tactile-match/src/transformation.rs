@@ -1,10 +1,10 @@
-//! The parameters of a rigid motion, a similarity or an affine map that a match has found.
+//! The parameters of a fitted rigid motion, similarity or affine map.
 
 use nalgebra::{Matrix3, Point, SMatrix, SVector, Vector3};
 use tactile_tps::Affine;
 
-/// The map `x ↦ A x + b` that a match has found, with its standard errors from the noise of the
-/// pairs: of a matcher that may only move, turn, grow or shear the model
+/// The map `x ↦ A x + b` found by a match, with its standard errors from the noise of the pairs. It
+/// exists if the matcher allows only translation, rotation, scaling or shear
 /// ([`Transformation`](crate::Transformation)).
 ///
 /// ```
@@ -27,24 +27,24 @@ use tactile_tps::Affine;
 pub struct FittedTransformation<const D: usize> {
     /// The matrix A.
     pub linear: SMatrix<f64, D, D>,
-    /// Where the origin goes, b, in the units of the points.
+    /// The image b of the origin, in the units of the points.
     pub shift: SVector<f64, D>,
     /// Standard errors of the shift.
     pub shift_error: SVector<f64, D>,
-    /// The growth of lengths, of an affine map in the geometric mean.
+    /// Scale factor of lengths. For an affine map, their geometric mean.
     pub scale: f64,
-    /// Its standard error. 0 of a rigid motion.
+    /// Standard error of the scale. 0 for a rigid motion.
     pub scale_error: f64,
-    /// The rotation vector, in radians. In the plane the last number is the angle and the others
-    /// are zero. Of an affine map the rotation nearest to it.
+    /// The rotation vector, in radians. In the plane the last component is the angle and the others
+    /// are zero. For an affine map it belongs to the nearest rotation.
     pub rotation: Vector3<f64>,
     /// Standard errors of the rotation.
     pub rotation_error: Vector3<f64>,
 }
 
 impl<const D: usize> FittedTransformation<D> {
-    /// From where the map puts the model, the rows that have a partner, and the noise of a
-    /// coordinate. `None` if the points do not determine a map.
+    /// Fits the map from the warped model, the rows with a partner, and the noise of a coordinate.
+    /// `None` if the points do not determine a map.
     pub(crate) fn of(
         model: &[Point<f64, D>],
         warped: &[Point<f64, D>],
@@ -68,7 +68,7 @@ impl<const D: usize> FittedTransformation<D> {
         let scale = whole.determinant().abs().powf(1.0 / D as f64);
         let extent = scatter.trace();
         let spread = Matrix3::from_fn(|r, c| if r < D && c < D { scatter[(r, c)] } else { 0.0 });
-        // Of the turned model; its inertia about each axis holds the rotation.
+        // The inertia of the rotated model about each axis determines the error of the rotation.
         let turn = rotation_of(&whole);
         let spread = turn * spread * turn.transpose();
         let inertia = Matrix3::identity() * spread.trace() - spread;
@@ -98,7 +98,7 @@ impl<const D: usize> FittedTransformation<D> {
     }
 }
 
-/// A map of the plane that leaves the third coordinate as it is.
+/// Extends a map of the plane by the identity in the third coordinate.
 fn filled_up<const D: usize>(linear: &SMatrix<f64, D, D>) -> Matrix3<f64> {
     Matrix3::from_fn(|r, c| match (r < D, c < D) {
         (true, true) => linear[(r, c)],

@@ -2,8 +2,8 @@
 
 use super::*;
 
-/// Two units in the last place: the polynomial's own rounding and that of the product with the
-/// power of two's reduction.
+/// Two units in the last place: one for the rounding of the polynomial, one for the argument
+/// reduction.
 #[test]
 fn agrees_with_the_standard_library() {
     for k in 0..200_000 {

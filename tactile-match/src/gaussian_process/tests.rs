@@ -28,7 +28,7 @@ fn scene() -> (Prior, Vec<f64>, Axes<2>) {
     (prior, weights, targets)
 }
 
-/// Leaving a point out by formula is leaving it out in fact.
+/// The leverage formula gives the same prediction as a fit without the point.
 #[test]
 fn leverage_gives_the_prediction_without_the_point() {
     let (prior, mut weights, targets) = scene();
@@ -42,14 +42,14 @@ fn leverage_gives_the_prediction_without_the_point() {
     weights[7] = 0.0;
     regression.fit(&prior, &weights, &targets, 0.01);
     for k in 0..2 {
-        // Conditioning of the Gram matrix is below 1e4 here: rounding stays under 1e-11.
+        // The condition number of the Gram matrix is below 1e4 here, so rounding stays under 1e-11.
         assert!((predicted[k] - regression.displacement.0[k][7]).abs() < 1e-11);
     }
 }
 
-/// Modes that the noise hides are left out of a fit. Against the fit with the whole covariance,
-/// `u = K (K + σ² W⁻¹)⁻¹ z`, a displacement moves by less than the deviation of what is left
-/// out at its point, √0.01 σ.
+/// A fit omits modes that the noise hides. Compared with the fit of the whole covariance,
+/// `u = K (K + σ² W⁻¹)⁻¹ z`, each displacement changes by less than the standard deviation
+/// neglected at its point, √0.01 σ.
 #[test]
 fn modes_left_out_move_the_warp_by_less_than_a_tenth_of_the_noise() {
     let n = 160;
@@ -100,7 +100,7 @@ fn modes_left_out_move_the_warp_by_less_than_a_tenth_of_the_noise() {
             }
         }
     }
-    // All are cut, the noisier the more.
+    // The ranks are truncated, the more the larger the noise.
     assert!(
         ranks[0] < ranks[1] && ranks[1] < ranks[2] && ranks[2] < 64,
         "{ranks:?}"

@@ -1,10 +1,10 @@
-//! Relaxation labelling, the paper's matching method as printed: dense, slow and obvious, to check
-//! faster ones against.
+//! Relaxation labelling, the paper's matching method as printed: a dense, slow reference that
+//! faster methods are checked against.
 //!
-//! Two point sets `x_i` (model, `I` points) and `y_j` (target, `J` points) are graphs: every point
+//! Two point sets `x_i` (model, `I` points) and `y_j` (target, `J` points) are graphs: each point
 //! is joined to its neighbours. A match matrix `M`, `(I + 1) × (J + 1)` with a slack row and a
-//! slack column for points without a partner, should keep neighbours neighbours. In the paper's
-//! numbers, with the reading taken here:
+//! slack column for points without a partner, should preserve neighbourhoods. The equations, with
+//! the paper's numbers and the reading taken here:
 //!
 //! | equation | what |
 //! |---|---|
@@ -18,18 +18,19 @@
 //! | (19) | support `S_ij = Σ_{a∈N(i)} Σ_{b∈N(j)} M_ab r(ia, jb)` |
 //! | (20) | `M_ij ← M_ij S_ij / Σ_j' M_ij' S_ij'`, the slack entry with a constant gain in place of `S` |
 //!
-//! Four readings need a word. β compares directions: a difference of printed angles breaks at ±180°
-//! and does not exist in 3-D, the angle between the vectors has neither fault (and the same value
-//! elsewhere). The maximum in α may be meant per pair or over all pairs: [`LengthMaximum`] offers
-//! both. γ is printed for the model's edge alone, which prefers one of the graphs:
-//! [`Compatibility`] offers that and, as the default, the product of both. γ is zero for a point's
-//! farthest neighbour, so that a point with one neighbour has no support: that is what is printed.
+//! Four equations need an interpretation. β compares directions: a difference of printed angles
+//! breaks at ±180° and does not exist in 3-D, whereas the angle between the vectors is defined
+//! everywhere and agrees with the difference elsewhere. The maximum in α may be taken per pair or
+//! over all pairs: [`LengthMaximum`] offers both. γ is printed for the model's edge alone, which
+//! treats the graphs differently: [`Compatibility`] offers this form and, as the default, the
+//! product of both. γ is zero for the farthest neighbour of a point, so a point with one neighbour
+//! has no support, as printed.
 //!
-//! One sweep costs `O(I J A B)` for `A` and `B` neighbours a point, and with neighbourhoods of the
-//! median radius `A ≈ I/2`, `B ≈ J/2`: fourth order, not the third the paper claims.
-//! [`AnnealedSoftassign`](crate::AnnealedSoftassign) is the matcher to use. [`RelaxationLabelling`]
-//! is what to check it against, and [`RelaxationLabelling::with_candidates`] runs the same method
-//! over few candidates.
+//! One sweep costs `O(I J A B)` for `A` and `B` neighbours per point. With neighbourhoods of the
+//! median radius `A ≈ I/2` and `B ≈ J/2`: this is fourth order, not third order as the paper
+//! claims. For work use [`AnnealedSoftassign`](crate::AnnealedSoftassign). [`RelaxationLabelling`]
+//! is the reference, and [`RelaxationLabelling::with_candidates`] runs the same method over few
+//! candidates.
 
 mod relaxation;
 
@@ -41,7 +42,7 @@ use nalgebra::{Point, SVector};
 use relaxation::{MatchMatrix, NeighbourGraph, energy, relax};
 use tactile_tps::Smoothing;
 
-/// Which points are a point's neighbours.
+/// Selects the neighbours of a point.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -64,19 +65,19 @@ use tactile_tps::Smoothing;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Neighbourhood {
-    /// All within the median of all pairwise distances of the set, the median included: the
-    /// paper's.
+    /// All points within the median of all pairwise distances of the set, the median included, as
+    /// in the paper.
     ///
-    /// Distances that exceed the median by rounding alone count as equal to it, so that the ties of
-    /// a regular grid do not depend on where the grid lies.
+    /// Distances that exceed the median only by rounding count as equal to it, so that the ties of
+    /// a regular grid do not depend on the grid's position.
     #[default]
     MedianRadius,
-    /// The `k` nearest, of equal distances those of the lower row first. All others if there are
-    /// fewer.
+    /// The `k` nearest points. Among equal distances the lower rows come first. If there are fewer
+    /// points, all of them.
     Nearest(usize),
 }
 
-/// What the maximum in α (15) is taken over.
+/// The set of edges over which the maximum in α (15) is taken.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -106,7 +107,7 @@ pub enum LengthMaximum {
     Global,
 }
 
-/// Which factors the compatibility r (18) of two edges has.
+/// The factors in the compatibility r (18) of two edges.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -133,27 +134,26 @@ pub enum LengthMaximum {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Compatibility {
-    /// One: the support counts neighbours (the method the paper's extends).
+    /// r = 1: the support counts neighbours (the method that the paper extends).
     Count,
-    /// α: like lengths.
+    /// α: compares lengths.
     Length,
-    /// αβ: like lengths and directions.
+    /// αβ: compares lengths and directions.
     LengthDirection,
-    /// αβγ with the γ of the model's edge alone, as (18) is printed.
+    /// αβγ with the γ of the model's edge alone, as printed in (18).
     Printed,
-    /// αβγγ′ with the γ of both edges: neither graph is preferred.
+    /// αβγγ′ with the γ of both edges: the graphs are treated alike.
     #[default]
     Full,
 }
 
-/// The paper's matching method (13)–(20) as printed: relaxation labelling, then a thin-plate
-/// spline, in turn.
+/// The paper's matching method (13)–(20) as printed: relaxation labelling alternates with a
+/// thin-plate spline.
 ///
-/// Every outer iteration joins the warped model and the target to graphs, compares their shape
-/// contexts for the first M, relaxes M by (19), (20) and Sinkhorn's normalisation until it no
-/// longer changes, and fits a thin-plate spline to the mean partners. Each sweep costs
-/// `O(I J A B)`, seconds for 105 points with neighbourhoods of the median radius. Use it to check,
-/// not to work.
+/// Each outer iteration builds the graphs of the warped model and the target, computes the first M
+/// from shape contexts, relaxes M by (19), (20) and Sinkhorn's normalisation until it converges,
+/// and fits a thin-plate spline to the mean partners. Each sweep costs `O(I J A B)`: seconds for
+/// 105 points with neighbourhoods of the median radius. Use it as a reference only.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -173,7 +173,7 @@ pub enum Compatibility {
 /// ```
 ///
 /// # Options
-/// Lengths refer to sets of root mean square radius one.
+/// Lengths refer to sets scaled to a root mean square radius of one.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -243,10 +243,10 @@ impl Default for RelaxationLabelling {
 }
 
 impl RelaxationLabelling {
-    /// Sets which points are neighbours (13).
+    /// Sets the neighbours of a point (13).
     ///
     /// # Errors
-    /// [`MatchError::InvalidOption`] for no neighbour at all.
+    /// [`MatchError::InvalidOption`] for zero neighbours.
     pub fn with_neighbourhood(mut self, neighbourhood: Neighbourhood) -> Result<Self, MatchError> {
         if let Neighbourhood::Nearest(k) = neighbourhood {
             at_least_one("neighbourhood", k)?;
@@ -255,22 +255,22 @@ impl RelaxationLabelling {
         Ok(self)
     }
 
-    /// Sets which factors the compatibility r (18) has.
+    /// Sets the factors of the compatibility r (18).
     #[must_use]
     pub fn with_compatibility(mut self, compatibility: Compatibility) -> Self {
         self.compatibility = compatibility;
         self
     }
 
-    /// Sets what the maximum in α (15) is taken over.
+    /// Sets the edges over which the maximum in α (15) is taken.
     #[must_use]
     pub fn with_length_maximum(mut self, maximum: LengthMaximum) -> Self {
         self.length_maximum = maximum;
         self
     }
 
-    /// Sets the temperature of the first probabilities, over shape-context distances between zero
-    /// and one (default 0.1).
+    /// Sets the temperature of the first probabilities (default 0.1). Shape-context distances range
+    /// from zero to one.
     ///
     /// # Errors
     /// [`MatchError::InvalidOption`] unless it is positive and finite.
@@ -286,8 +286,9 @@ impl RelaxationLabelling {
         Ok(self)
     }
 
-    /// Sets the slack (default 0.2): of the first probabilities relative to the likeliest partner,
-    /// and of the support relative to the mean over the model points of the largest.
+    /// Sets the slack (default 0.2). It applies to the first probabilities, relative to the
+    /// likeliest partner, and to the support, relative to the mean of the largest supports of the
+    /// model points.
     ///
     /// # Errors
     /// [`MatchError::InvalidOption`] outside `[0, 1]`.
@@ -308,7 +309,7 @@ impl RelaxationLabelling {
         Ok(self)
     }
 
-    /// Sets the most outer iterations (default 10).
+    /// Sets the maximum number of outer iterations (default 10).
     ///
     /// # Errors
     /// [`MatchError::InvalidOption`] for 0.
@@ -318,15 +319,15 @@ impl RelaxationLabelling {
         Ok(self)
     }
 
-    /// Keeps only this many likeliest candidates of every model point, at a fraction of the time
-    /// (default: all).
+    /// Keeps only this number of the likeliest candidates of each model point, for a fraction of
+    /// the time (default: all).
     ///
-    /// The pairs of largest first probability are kept. The others stay zero, which (20) would not
-    /// change. What pair `(a, b)` says for pair `(i, j)` in (19) does not depend on M: these links,
-    /// `I A c²` at most, are computed once an outer iteration, and a sweep costs one multiplication
-    /// each instead of `O(I J A B)`. With as many candidates as there are targets the answer is the
-    /// dense one to rounding. The other candidates of a point whose match is settled (to a hundred
-    /// roundings) leave the sweeps.
+    /// The pairs of largest first probability are kept. The others stay zero, which (20) preserves.
+    /// The contribution of pair `(a, b)` to pair `(i, j)` in (19) does not depend on M: these
+    /// links, at most `I A c²`, are computed once per outer iteration, and a sweep costs one
+    /// multiplication per link instead of `O(I J A B)`. With as many candidates as targets the
+    /// answer is the dense one to rounding. Once the match of a point is settled (to a hundred
+    /// roundings), its other candidates leave the sweeps.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -349,7 +350,7 @@ impl RelaxationLabelling {
     /// ```
     ///
     /// # Errors
-    /// [`MatchError::InvalidOption`] for no candidate.
+    /// [`MatchError::InvalidOption`] for zero candidates.
     pub fn with_candidates(mut self, candidates: usize) -> Result<Self, MatchError> {
         at_least_one("candidates", candidates)?;
         self.candidates = Some(candidates);
@@ -396,7 +397,7 @@ impl RelaxationLabelling {
     }
 }
 
-/// A match under way, both sets centred and of size one.
+/// A match in progress, with both sets centred and scaled to size one.
 struct Run<const D: usize> {
     model: Vec<Point<f64, D>>,
     target: Vec<Point<f64, D>>,
@@ -408,14 +409,14 @@ struct Run<const D: usize> {
 }
 
 impl<const D: usize> Run<D> {
-    /// Keeps the energy (14) of the present match matrix.
+    /// Records the energy (14) of the current match matrix.
     fn record_energy(&mut self, neighbourhood: Neighbourhood) {
         let [x, y] =
             [&self.warped, &self.target].map(|points| NeighbourGraph::new(points, neighbourhood));
         self.energy.push(energy(&self.matches, &x, &y));
     }
 
-    /// Mean partner of model point `i` and its weight, one less the slack.
+    /// Mean partner of model point `i`, and its weight: one minus the slack.
     fn partner(&self, i: usize) -> (SVector<f64, D>, f64) {
         let weights = &self.matches.row(i)[..self.target.len()];
         let mass: f64 = weights.iter().sum();
@@ -431,7 +432,7 @@ impl<const D: usize> Run<D> {
         }
     }
 
-    /// Fits the spline to the mean partners, moves the model, and returns the largest step.
+    /// Fits the spline to the mean partners and moves the model. Returns the largest displacement.
     fn fit(&mut self, smoothing: Smoothing) -> f64 {
         let (means, weights): (Vec<_>, Vec<_>) =
             (0..self.model.len()).map(|i| self.partner(i)).unzip();
@@ -456,13 +457,13 @@ impl<const D: usize> Run<D> {
         step
     }
 
-    /// Distinct partners of most probability in sum. None where the slack is likelier.
+    /// Distinct partners with the largest sum of probabilities. `None` if the slack is likelier.
     fn assignment(&self) -> Vec<Option<usize>> {
         let (rows, columns) = (self.model.len(), self.target.len());
         let costs: Vec<f64> = (0..rows)
             .flat_map(|i| self.matches.row(i)[..columns].iter().map(|&p| -p))
             .collect();
-        // Probabilities: finite, and as many as there are pairs.
+        // The entries are finite probabilities, one per pair.
         let mut assignment =
             linear_assignment(&costs, rows, columns).unwrap_or_else(|_| vec![None; rows]);
         for (i, partner) in assignment.iter_mut().enumerate() {
@@ -481,17 +482,17 @@ impl<const D: usize> Run<D> {
             .iter()
             .map(|p| self.frame.leave(p.coords))
             .collect();
-        // The spline's values determine it: interpolating them gives it back in the units of the
-        // caller.
+        // The values of the spline at the model points determine it, so interpolating them gives
+        // the spline in the units of the caller.
         let warp = spline(model, &positions, None, Smoothing::None);
         let warped: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
         let mut found = Matching::new(target, warp, warped, assignment);
         for (i, partner) in found.assignment.iter().enumerate() {
             let row = &self.matches.row(i)[..target.len()];
-            // Sinkhorn's normalisation ends with the columns: a row may sum to a little more than
-            // one.
+            // Sinkhorn's normalisation ends with the columns, so a row may sum to slightly more
+            // than one.
             let sum = self.matches.row(i).iter().sum::<f64>().max(1.0);
-            // Soft matches below this weight are left out.
+            // Soft matches below this weight are dropped.
             let kept = row.iter().copied().enumerate().filter(|p| p.1 > 1e-4);
             found.soft.push_row(kept.map(|(j, p)| (j, p / sum)));
             let sure = partner.map_or(self.matches[(i, target.len())], |j| row[j]);

@@ -4,7 +4,8 @@ use super::{Compatibility, LengthMaximum, Neighbourhood, RelaxationLabelling};
 use crate::ShapeContexts;
 use nalgebra::{Point, SVector};
 
-/// Links that are kept between sweeps. Those of more are computed anew in every sweep.
+/// Maximum number of links stored between sweeps. If there are more, each sweep computes them
+/// again.
 const MAX_STORED_LINKS: usize = 1 << 25;
 
 /// The edge from a point to one of its neighbours.
@@ -18,11 +19,11 @@ struct Edge<const D: usize> {
     pub vector: SVector<f64, D>,
     /// Its length `d`.
     pub length: f64,
-    /// [`gamma`] of this edge among the edges of its point.
+    /// The value of [`gamma`] for this edge among the edges of its point.
     pub gamma: f64,
 }
 
-/// A point set as a graph: every point with the edges to its neighbours.
+/// A point set as a graph: each point with the edges to its neighbours.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct NeighbourGraph<const D: usize> {
     edges: Vec<Edge<D>>,
@@ -30,7 +31,7 @@ pub(super) struct NeighbourGraph<const D: usize> {
 }
 
 impl<const D: usize> NeighbourGraph<D> {
-    /// Joins every point to its neighbours. `O(n² log n)`.
+    /// Joins each point to its neighbours. `O(n² log n)`.
     pub(super) fn new(points: &[Point<f64, D>], neighbourhood: Neighbourhood) -> Self {
         let radius = median_pairwise_distance(points);
         let mut graph = Self {
@@ -85,7 +86,7 @@ impl<const D: usize> NeighbourGraph<D> {
         &self.edges[self.range(i)]
     }
 
-    /// Where the edges of point `i` stand in [`edges`](Self::edges).
+    /// Index range of the edges of point `i` in [`edges`](Self::edges).
     fn range(&self, i: usize) -> std::ops::Range<usize> {
         self.starts[i]..self.starts[i + 1]
     }
@@ -95,14 +96,14 @@ impl<const D: usize> NeighbourGraph<D> {
         self.starts.len() - 1
     }
 
-    /// Length of the longest edge. Zero without edges.
+    /// Length of the longest edge. Zero if there are no edges.
     fn longest(&self) -> f64 {
         self.edges.iter().fold(0.0_f64, |m, e| m.max(e.length))
     }
 }
 
-/// What rounding may add to a distance of about `radius`: the coordinates themselves carry half a
-/// unit in the last place.
+/// Bound on the rounding error of a distance of about `radius`: the coordinates themselves are
+/// rounded to half a unit in the last place.
 fn rounding<const D: usize>(points: &[Point<f64, D>], radius: f64) -> f64 {
     let largest = points
         .iter()
@@ -111,7 +112,7 @@ fn rounding<const D: usize>(points: &[Point<f64, D>], radius: f64) -> f64 {
     f64::EPSILON * (largest + largest)
 }
 
-/// The median of all pairwise distances (the mean of the two middle ones where their number is
+/// The median of all pairwise distances (the mean of the two middle distances if their number is
 /// even). `None` for fewer than two points. `O(n² log n)`.
 fn median_pairwise_distance<const D: usize>(points: &[Point<f64, D>]) -> Option<f64> {
     let mut distances = Vec::with_capacity(points.len() * points.len().saturating_sub(1) / 2);
@@ -127,17 +128,17 @@ fn median_pairwise_distance<const D: usize>(points: &[Point<f64, D>]) -> Option<
     }
 }
 
-/// α (15), the maximum per pair: `1 − |d − e| / max(d, e) = min(d, e) / max(d, e)`. Two lengths of
-/// zero are alike.
+/// α (15), with the maximum per pair: `1 − |d − e| / max(d, e) = min(d, e) / max(d, e)`. Two
+/// lengths of zero count as equal.
 ///
-/// The quotient keeps its digits where the lengths differ by many decades. The printed difference
-/// loses them.
+/// The quotient keeps its digits if the lengths differ by many decades, whereas the printed
+/// difference loses them.
 fn alpha(d: f64, e: f64) -> f64 {
     let longer = d.max(e);
     if longer > 0.0 { d.min(e) / longer } else { 1.0 }
 }
 
-/// α (15), the maximum over all edges: `1 − |d − e| / longest`. One where `longest` is zero.
+/// α (15), with the maximum over all edges: `1 − |d − e| / longest`. One if `longest` is zero.
 fn alpha_global(d: f64, e: f64, longest: f64) -> f64 {
     if longest > 0.0 {
         1.0 - (d - e).abs() / longest
@@ -147,13 +148,13 @@ fn alpha_global(d: f64, e: f64, longest: f64) -> f64 {
 }
 
 /// β (16): `1 − ∠(u, v) / π`, one for parallel and zero for opposite edges, in any dimension. Zero
-/// if an edge has no length.
+/// if an edge has length zero.
 ///
-/// The angle is `atan2(|u ∧ v|, u · v)`, exact at 0 and π where `acos` loses half the digits or
-/// returns NaN.
+/// The angle is `atan2(|u ∧ v|, u · v)`, which is exact at 0 and π. `acos` would lose half the
+/// digits there or return NaN.
 fn beta<const D: usize>(u: &SVector<f64, D>, v: &SVector<f64, D>) -> f64 {
-    // Largest components scaled to one: no square under- or overflows, and parallel vectors stay
-    // exactly parallel.
+    // Scaling the largest components to one prevents underflow and overflow of the squares, and
+    // keeps parallel vectors exactly parallel.
     let (largest_u, largest_v) = (u.amax(), v.amax());
     if largest_u <= 0.0 || largest_v <= 0.0 {
         return 0.0;
@@ -166,11 +167,11 @@ fn beta<const D: usize>(u: &SVector<f64, D>, v: &SVector<f64, D>) -> f64 {
             wedge += minor * minor;
         }
     }
-    // π − ∠(u, v) = ∠(u, −v): near opposite edges keep the digits of a small β.
+    // π − ∠(u, v) = ∠(u, −v), so nearly opposite edges keep the digits of a small β.
     wedge.sqrt().atan2(-u.dot(&v)) / std::f64::consts::PI
 }
 
-/// γ (17): `1 − d / longest`, `longest` among the edges of the same point. One where `longest` is
+/// γ (17): `1 − d / longest`, with `longest` among the edges of the same point. One if `longest` is
 /// zero.
 fn gamma(d: f64, longest: f64) -> f64 {
     if longest > 0.0 {
@@ -180,17 +181,17 @@ fn gamma(d: f64, longest: f64) -> f64 {
     }
 }
 
-/// A [`Compatibility`] ready to be evaluated: the factors and the maximum in α.
+/// A [`Compatibility`] ready for evaluation: the factors and the maximum in α.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct CompatibilityRule {
     /// The factors.
     pub factors: Compatibility,
-    /// Longest edge of both graphs for [`alpha_global`]. `None` for [`alpha`].
+    /// Longest edge of both graphs for [`alpha_global`]. `None` selects [`alpha`].
     pub longest: Option<f64>,
 }
 
 impl CompatibilityRule {
-    /// r (18) of model edge `x` and target edge `y`.
+    /// The compatibility r (18) of model edge `x` and target edge `y`.
     fn of<const D: usize>(&self, x: &Edge<D>, y: &Edge<D>) -> f64 {
         let length = || match self.longest {
             None => alpha(x.length, y.length),
@@ -207,8 +208,8 @@ impl CompatibilityRule {
 }
 
 /// The match matrix `M` of the paper, `(I + 1) × (J + 1)`, row-major: entry `(i, j)` is the
-/// probability that model point `i` is target point `j`. Row `I` and column `J` are the slack for
-/// points without a partner, and the corner `(I, J)` is not used.
+/// probability that model point `i` corresponds to target point `j`. Row `I` and column `J` are the
+/// slack for points without a partner. The corner `(I, J)` is not used.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct MatchMatrix {
     rows: usize,
@@ -226,7 +227,8 @@ impl MatchMatrix {
         }
     }
 
-    /// Entry by entry, `i` in `0..=rows` and `j` in `0..=columns`. The corner is set to zero.
+    /// Fills the matrix entry by entry, `i` in `0..=rows` and `j` in `0..=columns`. The corner is
+    /// set to zero.
     fn from_fn(rows: usize, columns: usize, mut entry: impl FnMut(usize, usize) -> f64) -> Self {
         let mut m = Self::zeros(rows, columns);
         for i in 0..=rows {
@@ -239,7 +241,7 @@ impl MatchMatrix {
         m
     }
 
-    /// Row `i` with its slack entry last. `i = I` is the slack row.
+    /// Row `i` with its slack entry last. Row `I` is the slack row.
     ///
     /// # Panics
     /// If `i` exceeds the number of rows.
@@ -275,12 +277,12 @@ impl std::ops::IndexMut<(usize, usize)> for MatchMatrix {
     }
 }
 
-/// The energy (14), `Σ_i Σ_{a∈N(i)} Σ_j Σ_{b∈N(j)} M_ij M_ab`: how many edges the match keeps, each
-/// counted from both ends, the slack left out. `O(A B)` for each of the at most `I J` entries that
-/// are not zero.
+/// The energy (14), `Σ_i Σ_{a∈N(i)} Σ_j Σ_{b∈N(j)} M_ij M_ab`: the number of edges that the match
+/// preserves, each counted from both ends, without the slack. `O(A B)` for each of the at most
+/// `I J` non-zero entries.
 ///
 /// # Panics
-/// If `m` has not the size of the graphs.
+/// If the size of `m` does not match the graphs.
 pub(super) fn energy<const D: usize>(
     m: &MatchMatrix,
     model: &NeighbourGraph<D>,
@@ -305,15 +307,14 @@ pub(super) fn energy<const D: usize>(
     energy
 }
 
-/// (20): every model row becomes `[M_ij S_ij, M_i,slack · slack_gain]` over its sum. Returns the
-/// rows whose sum was zero, which stay as they were. `support` is row-major `I × J`. The slack row
-/// is not touched.
+/// Update (20): each model row becomes `[M_ij S_ij, M_i,slack · slack_gain]` divided by its sum.
+/// Returns the rows whose sum was zero; they are not changed. `support` is row-major `I × J`. The
+/// slack row is not changed.
 ///
-/// Each product is taken relative to the largest of its row, so that none under- or overflows on
-/// the way.
+/// Each product is divided by the largest in its row first, so that none underflows or overflows.
 ///
 /// # Panics
-/// If `support` has not `I · J` entries.
+/// If `support` does not have `I · J` entries.
 fn update(m: &mut MatchMatrix, support: &[f64], slack_gain: f64) -> Vec<usize> {
     let columns = m.columns;
     assert_eq!(support.len(), m.rows * columns, "size of the support");
@@ -351,10 +352,10 @@ fn update(m: &mut MatchMatrix, support: &[f64], slack_gain: f64) -> Vec<usize> {
     zero_rows
 }
 
-/// Alternate normalisation with slack. Each sweep divides the rows `0..I` by their sums over
+/// Alternating normalisation with slack. Each sweep divides the rows `0..I` by their sums over
 /// `J + 1` entries, then the columns `0..J` by their sums over `I + 1` entries. The slack row and
-/// column are not normalised, sums of zero are skipped. Stops after `sweeps`, or when no row is
-/// further than `tolerance` from one. Returns `max_i |1 − Σ_j M_ij|`, the columns being one.
+/// column are not normalised, and sums of zero are skipped. It stops after `sweeps`, or when each
+/// row sum is within `tolerance` of one. Returns `max_i |1 − Σ_j M_ij|` (the columns sum to one).
 fn sinkhorn(m: &mut MatchMatrix, sweeps: usize, tolerance: f64) -> f64 {
     for _ in 0..sweeps {
         for i in 0..m.rows {
@@ -386,7 +387,7 @@ fn row_defect(m: &MatchMatrix) -> f64 {
     })
 }
 
-/// The contexts reach twice the mean distance of two points. None where all coincide.
+/// Shape contexts with a radius of twice the mean pairwise distance. `None` if all points coincide.
 fn contexts<const D: usize>(points: &[Point<f64, D>]) -> Option<ShapeContexts> {
     let distances = points
         .iter()
@@ -396,9 +397,9 @@ fn contexts<const D: usize>(points: &[Point<f64, D>]) -> Option<ShapeContexts> {
     ShapeContexts::new(points, 2.0 * sum / (pairs.max(1) as f64)).ok()
 }
 
-/// The first match matrix: `exp(−C_ij / temperature)` of the shape-context distances `C`, `slack`
-/// relative to the likeliest partner in the slack entries, after one sweep of
-/// [`sinkhorn`]. `O(I J)` times the number of bins.
+/// The first match matrix: `exp(−C_ij / temperature)` of the shape-context distances `C`. The slack
+/// entries are `slack` times the entry of the likeliest partner. One sweep of [`sinkhorn`] follows.
+/// `O(I J)` times the number of bins.
 fn first_matches<const D: usize>(
     model: &[Point<f64, D>],
     target: &[Point<f64, D>],
@@ -424,11 +425,10 @@ fn first_matches<const D: usize>(
     m
 }
 
-/// One outer iteration's match matrix: first probabilities of `model` (as warped so far) and
-/// `target`, then (19), (20) and normalisation in turn until M no longer changes.
+/// The match matrix of one outer iteration: first probabilities of `model` (as warped so far) and
+/// `target`, then (19), (20) and normalisation in turn until M converges.
 ///
-/// Where the options limit the candidates, all but the likeliest are zero, which (20) does not
-/// change.
+/// If the options limit the candidates, all but the likeliest are zero, which (20) preserves.
 pub(super) fn relax<const D: usize>(
     options: &RelaxationLabelling,
     model: &[Point<f64, D>],
@@ -461,7 +461,7 @@ pub(super) fn relax<const D: usize>(
     m
 }
 
-/// Gain of the slack: a share of what the best partners get, so that it means the same for every
+/// Gain of the slack: a fraction of the best partners' support, so that it means the same for every
 /// neighbourhood.
 fn slack_gain(support: &[f64], columns: usize, share: f64) -> f64 {
     let rows = support.len() / columns;
@@ -471,8 +471,8 @@ fn slack_gain(support: &[f64], columns: usize, share: f64) -> f64 {
     best.fold(0.0, |sum, s| sum + s) * (share / rows as f64)
 }
 
-/// The target that has all of a row, so that no other can still come up: what they have is below a
-/// hundred roundings.
+/// The target that holds the whole row, if no other can recover: the others are below a hundred
+/// roundings.
 fn settled_on(row: &[f64]) -> Option<usize> {
     let sum: f64 = row.iter().sum();
     let enough = sum * (1.0 - 50.0 * f64::EPSILON);
@@ -481,8 +481,8 @@ fn settled_on(row: &[f64]) -> Option<usize> {
         .position(|&p| p > 0.0 && p >= enough)
 }
 
-/// Sets all but the `count` likeliest partners of every model point to zero. Of equal ones the
-/// lower rows stay.
+/// Sets all but the `count` likeliest partners of each model point to zero. Among equal ones the
+/// lower rows are kept.
 fn keep_likeliest(m: &mut MatchMatrix, count: usize) {
     let columns = m.columns;
     let mut order: Vec<usize> = Vec::with_capacity(columns);
@@ -495,17 +495,17 @@ fn keep_likeliest(m: &mut MatchMatrix, count: usize) {
     }
 }
 
-/// The terms of the support (19): for every candidate pair `(i, j)` the entries `M_ab` of its
-/// neighbours' candidate pairs, with their compatibilities. They do not depend on M.
+/// The terms of the support (19): for each candidate pair `(i, j)` the entries `M_ab` of its
+/// neighbours' candidate pairs, with their compatibilities, which do not depend on M.
 struct Links<'a, const D: usize> {
     graphs: &'a [NeighbourGraph<D>; 2],
     rule: CompatibilityRule,
-    /// Candidates of every model point.
+    /// Candidates of each model point.
     candidates: Vec<Vec<usize>>,
-    /// Where the links of every candidate pair start, and where those of the last pair end. Empty
-    /// where there are too many links to be stored.
+    /// Start of the links of each candidate pair, and the end of the last pair's links. Empty if
+    /// there are too many links to store.
     starts: Vec<usize>,
-    /// Places in M and compatibilities.
+    /// Positions in M and compatibilities.
     stored: Vec<(u32, f64)>,
 }
 
@@ -547,7 +547,7 @@ impl<'a, const D: usize> Links<'a, D> {
         (self.starts, self.stored) = (starts, stored);
     }
 
-    /// Calls `take` with the pairs `(a, b)` that support pair `(i, j)`, and their compatibilities.
+    /// Calls `take` with each pair `(a, b)` that supports pair `(i, j)`, and its compatibility.
     fn visit(&self, i: usize, j: usize, mut take: impl FnMut(usize, usize, f64)) {
         let mut edge_to = vec![None; self.graphs[1].points()];
         for edge in self.graphs[1].of(j) {
@@ -562,7 +562,7 @@ impl<'a, const D: usize> Links<'a, D> {
         }
     }
 
-    /// The support (19) of the candidate pairs, row-major `I × J`, zero for all others:
+    /// The support (19) of the candidate pairs, row-major `I × J`, and zero for all others:
     /// `S_ij = Σ_{a∈N(i)} Σ_{b∈N(j)} M_ab r(ia, jb)`.
     ///
     /// A point whose match is settled to rounding keeps the support of that pair alone.

@@ -1,20 +1,21 @@
-//! Shape contexts: where the other points of a set lie, seen from each point.
+//! Shape contexts: the distribution of the other points of a set as seen from each point.
 //!
 //! The context of a point is a histogram of the vectors to all other points, in bins of
-//! log-distance and direction
-//! [Belongie, Malik & Puzicha, *Shape matching and object recognition using shape contexts*, PAMI
-//! 24 (2002)]; two contexts are compared by the χ² distance `½ Σ (g − h)²/(g + h)` of the
-//! histograms over their mean count. In the plane directions are twelve sectors, in space the 26
-//! neighbours of a cube's centre. Points between two sectors of the plane count for both in
-//! proportion, so that a small turn changes the histogram a little.
+//! log-distance and direction [Belongie, Malik & Puzicha, *Shape matching and object recognition
+//! using shape contexts*, PAMI 24 (2002)]. Two contexts are compared by the χ² distance
+//! `½ Σ (g − h)²/(g + h)` of the histograms, divided by their mean count. The directions are twelve
+//! sectors in the plane, and the 26 neighbours of a cube's centre in space. In the plane, points
+//! between two sectors contribute to both in proportion, so that a small rotation changes the
+//! histogram only a little.
 
 use crate::{MatchError, error};
 use nalgebra::Point;
 use tactile_core::vectorised;
 
-/// Radial bins: the outermost ends at the largest radius, each further one at half the radius.
+/// Radial bins: the outermost ends at the largest radius, and each further one at half the previous
+/// radius.
 const SHELLS: usize = 5;
-/// Bins are padded to a multiple of this.
+/// The number of bins is padded to a multiple of this.
 const LANES: usize = 16;
 
 /// The shape contexts of a point set.
@@ -41,7 +42,7 @@ pub struct ShapeContexts {
 }
 
 impl ShapeContexts {
-    /// The contexts of all `points`, of neighbours up to `radius` away: `O(n²)`.
+    /// Computes the contexts of all `points` from neighbours up to `radius` away: `O(n²)`.
     ///
     /// # Errors
     /// [`MatchError::NotFinite`] for a coordinate that is not finite, [`MatchError::InvalidOption`]
@@ -60,20 +61,21 @@ impl ShapeContexts {
         Ok(contexts)
     }
 
-    /// The histogram of point `i`, shell by shell from the innermost.
+    /// The histogram of point `i`, in shells from the innermost outwards.
     #[cfg(test)]
     fn histogram(&self, i: usize) -> &[f32] {
         &self.histograms[i * self.width..i * self.width + self.bins]
     }
 
-    /// χ² distance of the contexts of point `i` here and point `j` of `other`, in [0, 1].
+    /// χ² distance between the context of point `i` here and that of point `j` in `other`, in [0,
+    /// 1].
     #[must_use]
     pub(crate) fn cost(&self, i: usize, other: &Self, j: usize) -> f32 {
         let (g, h) = (self.row(i), other.row(j));
         chi_squared(g, h) / (self.totals[i] + other.totals[j]).max(1.0)
     }
 
-    /// The costs of point `i` here and all points of `other`, into `costs`: the χ² distances of
+    /// Writes the costs of point `i` and all points of `other` into `costs`: the χ² distances of
     /// their contexts, in [0, 1].
     ///
     /// ```
@@ -106,7 +108,7 @@ impl ShapeContexts {
         &self.histograms[i * self.width..(i + 1) * self.width]
     }
 
-    /// Computes the contexts anew, in the memory of the old ones.
+    /// Recomputes the contexts, reusing the memory.
     pub(crate) fn build<const D: usize>(&mut self, points: &[[f64; D]], radius: f64) {
         self.bins = SHELLS * sectors::<D>();
         self.width = self.bins.next_multiple_of(LANES);
@@ -132,8 +134,7 @@ fn sectors<const D: usize>() -> usize {
     }
 }
 
-/// Adds one neighbour to a histogram. Coinciding points and those beyond the radius have no place
-/// in it.
+/// Adds one neighbour to a histogram. Coincident points and points beyond the radius are skipped.
 fn count<const D: usize>(histogram: &mut [f32], offset: &[f64; D], radius: f64) {
     let square = offset.iter().map(|v| v * v).sum::<f64>() / (radius * radius);
     if square <= 0.0 || square > 1.0 {
@@ -152,16 +153,16 @@ fn count<const D: usize>(histogram: &mut [f32], offset: &[f64; D], radius: f64) 
     }
 }
 
-/// The direction of least angle: the 26 neighbours of a cube's centre, or the axes in other
-/// dimensions.
+/// The direction at the smallest angle: one of the 26 neighbours of a cube's centre, or the axes in
+/// other dimensions.
 fn sector<const D: usize>(offset: &[f64; D]) -> usize {
     let best = |a: (f64, usize), b: (f64, usize)| if b.0 > a.0 { b } else { a };
     if D != 3 {
         let axis = (0..D).map(|k| (offset[k].abs(), 2 * k + usize::from(offset[k] < 0.0)));
         return axis.fold((-1.0, 0), best).1;
     }
-    // With the sizes sorted, the nearest of (1,0,0), (1,1,0)/√2 and (1,1,1)/√3 has the largest
-    // scalar product.
+    // With the components sorted by size, the nearest of (1,0,0), (1,1,0)/√2 and (1,1,1)/√3 has the
+    // largest scalar product.
     let mut order = [0, 1, 2];
     order.sort_by(|&a, &b| offset[b].abs().total_cmp(&offset[a].abs()));
     let (mut sum, mut choice) = (0.0, (-1.0, 0));
@@ -208,7 +209,7 @@ mod tests {
                 .iter()
                 .filter(|q| (1e-9..=3.0).contains(&(*q - p).norm()))
                 .count();
-            // Shares of one are summed in single precision.
+            // The fractions of each unit count are summed in single precision.
             assert!((contexts.histogram(i).iter().sum::<f32>() - near as f32).abs() < 1e-4);
         }
     }
@@ -233,7 +234,7 @@ mod tests {
                 dot / d.iter().map(|x| x * x).sum::<f64>().sqrt()
             };
             let best = directions.iter().map(along).fold(f64::MIN, f64::max);
-            // The same scalar products, in another order of rounding.
+            // The same scalar products, rounded in another order.
             assert!((along(&directions[sector(&v)]) - best).abs() < 1e-12);
         }
     }
@@ -251,7 +252,7 @@ mod tests {
         for i in 0..20 {
             assert_eq!(costs[i][i], 0.0);
             for j in 0..20 {
-                // Sums of 16 lanes in single precision.
+                // The sums over 16 lanes are in single precision.
                 assert!((costs[i][j] - costs[j][i]).abs() < 1e-5 && costs[i][j] <= 1.0);
             }
         }

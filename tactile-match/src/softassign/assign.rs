@@ -1,18 +1,18 @@
 //! Soft assignment: affinities, Sinkhorn normalisation and the moments of the rows, over blocks of
-//! near targets.
+//! neighbouring targets.
 
 use tactile_core::vectorised;
 
-/// What the affinities are: `exp(−s |yᵢ − tⱼ|²/2σ²)`.
+/// Parameters of the affinities `exp(−s |yᵢ − tⱼ|²/2σ²)`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gaussian {
     /// The variance σ².
     pub variance: f64,
-    /// The power s that they are raised to.
+    /// The exponent s.
     pub sharpness: f64,
 }
 
-/// Sums over the rows of M.
+/// Moments of the rows of M.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RowMoments<const D: usize> {
     /// Row sums without the slack.
@@ -23,14 +23,14 @@ pub(super) struct RowMoments<const D: usize> {
     pub spread: Vec<f64>,
 }
 
-/// The match matrix in factored form, with the moments of its rows. Columns stand in the order of
+/// The match matrix in factored form, with the moments of its rows. The columns are in the order of
 /// the blocks.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SoftAssignment<const D: usize> {
     pub blocks: Blocks<D>,
-    /// Affinities so much fainter than the largest there can be are left out.
+    /// Affinities below this fraction of the largest possible one are dropped.
     pub faintest: f64,
-    /// Where the blocks of every row begin in `active`, and one past the last.
+    /// Start of the blocks of each row in `active`, and the end of the last.
     pub starts: Vec<usize>,
     pub active: Vec<u32>,
     pub reach: Vec<f32>,
@@ -44,16 +44,16 @@ pub(super) struct SoftAssignment<const D: usize> {
 
 // Soft assignment: the match matrix M from distances, made doubly stochastic with slack (Sinkhorn).
 //
-// `m_ij = aᵢ bⱼ exp(−|yᵢ − tⱼ|²/2σ²)` with `aᵢ`, `bⱼ` such that every row and every column sums to
-// one together with its slack, whose weight is the density of outliers seen through the same
-// Gaussian. Worked in single precision: the weights need no more, and the positions they lead to
-// are refined in double precision.
+// `m_ij = aᵢ bⱼ exp(−|yᵢ − tⱼ|²/2σ²)`, with `aᵢ` and `bⱼ` such that each row and each column sums
+// to one together with its slack. The weight of the slack is the density of outliers under the same
+// Gaussian. Single precision suffices for the weights; the resulting positions are refined in
+// double precision.
 //
-// The targets are put into blocks of neighbours ([`blocks`](super::blocks)); of a row only the
-// blocks within reach of its Gaussian are kept. At a low temperature that is a small part of `I J`.
+// The targets are grouped into blocks of neighbours ([`blocks`](super::blocks)); a row keeps only
+// the blocks within reach of its Gaussian. At a low temperature they are a small part of `I J`.
 
 impl<const D: usize> SoftAssignment<D> {
-    /// Takes the target points.
+    /// Stores the target points.
     pub(super) fn set_targets(&mut self, targets: &[[f64; D]]) {
         self.blocks.build(targets);
     }
@@ -63,8 +63,8 @@ impl<const D: usize> SoftAssignment<D> {
         self.blocks.order.len()
     }
 
-    /// The Gaussian affinities of `warped`. Blocks in which all are below `least`, or below
-    /// [`faintest`](Self::faintest), are left out.
+    /// Computes the Gaussian affinities of `warped`. Blocks in which all are below `least` or below
+    /// [`faintest`](Self::faintest) are dropped.
     pub(super) fn affinities(&mut self, warped: &[[f64; D]], gaussian: Gaussian, least: f64) {
         let Gaussian {
             variance,
@@ -89,9 +89,9 @@ impl<const D: usize> SoftAssignment<D> {
                 }
                 let dense = warped.len() * blocks.width();
                 let sparse = self.active.len() * LANES;
-                // Of small sets all the memory there can be is taken at once: no later match of
-                // sets of this size needs more. Match matrices of so many entries (16 MB) are kept
-                // as if they were dense.
+                // For small sets the largest possible memory is allocated at once, so that no later
+                // match of sets of this size allocates. Matrices up to this number of entries (16
+                // MB) are stored as if they were dense.
                 kernel.resize(if dense <= (1 << 22) { dense } else { sparse }, 0.0);
                 let rows = kernel.as_chunks_mut::<LANES>().0;
                 for (y, range) in warped.iter().zip(self.starts.windows(2)) {
@@ -110,7 +110,7 @@ impl<const D: usize> SoftAssignment<D> {
         self.starts.len() - 1
     }
 
-    /// The blocks of row `i`, and its affinities there.
+    /// The blocks of row `i` with their affinities.
     #[inline(always)]
     fn row(&self, i: usize) -> impl Iterator<Item = (usize, &[f32; LANES])> {
         row_of(&self.starts, &self.active, &self.kernel, i)
@@ -158,7 +158,7 @@ impl<const D: usize> SoftAssignment<D> {
         );
     }
 
-    /// Row `i` of M where it is not zero: target rows, in the order of the blocks, and entries.
+    /// The non-zero entries of row `i` of M: target rows, in the order of the blocks, and values.
     pub(super) fn entries(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let (scale, columns) = (self.row_scale[i], self.column_scale.as_chunks::<LANES>().0);
         self.row(i).flat_map(move |(block, k)| {
@@ -168,8 +168,8 @@ impl<const D: usize> SoftAssignment<D> {
         })
     }
 
-    /// Sums of the affinities over the rows, for every column. The first [`targets`](Self::targets)
-    /// are targets.
+    /// Sums of the affinities over the rows, for each column. The first [`targets`](Self::targets)
+    /// columns are targets.
     pub(super) fn column_totals(&self, totals: &mut Vec<f64>) {
         refill(totals, self.blocks.width(), 0.0);
         let totals = totals.as_chunks_mut::<LANES>().0;
@@ -187,7 +187,7 @@ impl<const D: usize> SoftAssignment<D> {
         );
     }
 
-    /// Sums of the affinities over the columns, each times its factor, for every row.
+    /// Sums over the columns of each affinity times its column's factor, for each row.
     pub(super) fn row_totals(&self, factors: &[f64], totals: &mut Vec<f64>) {
         let factors = factors.as_chunks::<LANES>().0;
         totals.clear();
@@ -223,7 +223,7 @@ fn row_of<'a>(
         .zip(&rows[range])
 }
 
-/// In single precision.
+/// Converts to single precision.
 #[inline(always)]
 fn single<const D: usize>(y: &[f64; D]) -> [f32; D] {
     let mut single = [0.0; D];
@@ -238,11 +238,11 @@ fn refill<V: Clone>(values: &mut Vec<V>, len: usize, value: V) {
     values.resize(len, value);
 }
 
-// The moments of the rows of a match matrix in factored form.
+// Moments of the rows of a match matrix in factored form.
 
 impl<const D: usize> SoftAssignment<D> {
-    /// Sets the moments of M about `warped`: how much of a point is matched, and where its soft
-    /// partners lie.
+    /// Computes the moments of M about `warped`: the matched weight of each point and the mean
+    /// position of its soft partners.
     pub(super) fn sum_moments(&mut self, warped: &[[f64; D]]) {
         let mut moments = std::mem::take(&mut self.moments);
         let RowMoments {
@@ -279,8 +279,8 @@ impl<const D: usize> SoftAssignment<D> {
         self.moments = moments;
     }
 
-    /// Makes rows that the last column normalisation left above one sum to one: where points
-    /// coincide, a few sweeps do not converge.
+    /// Scales rows whose sum the last column normalisation left above one. If points coincide, a
+    /// few sweeps do not converge.
     pub(super) fn cap_rows(&mut self) {
         let weights = self.moments.weight.iter_mut();
         for (scale, weight) in self.row_scale.iter_mut().zip(weights) {
@@ -291,29 +291,30 @@ impl<const D: usize> SoftAssignment<D> {
     }
 }
 
-// Target points in blocks of neighbours: what is far from a block's box is far from all its points.
+// Target points in blocks of neighbours. A point that is far from the box of a block is far from
+// all its points.
 
-/// Points a block: one or two vectors of single precision.
+/// Points per block: one or two vectors of single precision.
 const LANES: usize = 16;
 
-/// Boxes in a box of the next level: in large sets whole groups are passed over at once.
+/// Number of boxes per box of the next level. In large sets whole groups are skipped at once.
 const GROUP: usize = 32;
-/// So many boxes are looked at one after the other faster than through a further level.
+/// Up to this number of boxes, a linear scan is faster than a further level.
 const MOST_BOXES: usize = 256;
 
-/// Points in the order of their blocks, one array an axis, with the blocks' boxes.
+/// Points in the order of their blocks, one array per axis, with the boxes of the blocks.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Blocks<const D: usize> {
-    /// Which point stands at every place.
+    /// Index of the point at each position.
     pub order: Vec<usize>,
     axes: Vec<f32>,
-    /// The boxes of the blocks, then those of [`GROUP`] boxes of the level before.
+    /// The boxes of the blocks, then at each further level the boxes of [`GROUP`] boxes below.
     levels: Vec<Boxes>,
-    /// The last level in use.
+    /// The highest level in use.
     top: usize,
 }
 
-/// Boxes by their sides, one array an axis.
+/// Boxes given by their sides, one array per axis.
 #[derive(Clone, Debug, Default)]
 struct Boxes {
     low: Vec<f32>,
@@ -321,8 +322,7 @@ struct Boxes {
 }
 
 impl<const D: usize> Blocks<D> {
-    /// Sorts `points` into blocks: halves across the longest side, until one block is left.
-    /// `O(J log² J)`.
+    /// Sorts `points` into blocks by repeated halving across the longest side. `O(J log² J)`.
     pub(super) fn build(&mut self, points: &[[f64; D]]) {
         self.order.clear();
         self.order.extend(0..points.len());
@@ -338,7 +338,7 @@ impl<const D: usize> Blocks<D> {
             axes.extend(order.iter().map(|&j| points[j][k] as f32));
             let real = &axes[k * width..];
             self.levels[0].extend(real, real, LANES);
-            // Where the padding lies: no Gaussian reaches it, and its square is finite.
+            // Position of the padding: no Gaussian reaches it, and its square is finite.
             axes.resize((k + 1) * width, 1e15);
         }
         self.top = 0;
@@ -356,7 +356,7 @@ impl<const D: usize> Blocks<D> {
         }
     }
 
-    /// Number of places, padding included.
+    /// Number of positions, padding included.
     fn width(&self) -> usize {
         self.order.len().next_multiple_of(LANES)
     }
@@ -374,9 +374,9 @@ impl<const D: usize> Blocks<D> {
     }
 
     /// Appends the blocks whose boxes lie within the squared distance `cut` of `y`, in ascending
-    /// order. `squared` is scratch.
+    /// order. `squared` is working memory.
     ///
-    /// `O(J/16)` for small sets, `O(log J)` and the blocks in reach for large ones.
+    /// `O(J/16)` for small sets; for large ones `O(log J)` plus the number of blocks in reach.
     #[inline(always)]
     fn within(&self, y: &[f32; D], cut: f32, squared: &mut Vec<f32>, found: &mut Vec<u32>) {
         let top = self.top;
@@ -416,7 +416,7 @@ impl Boxes {
         self.high.clear();
     }
 
-    /// Appends the boxes of so many consecutive members, given by their sides along one axis.
+    /// Appends the boxes of `members` consecutive boxes each, given by their sides along one axis.
     fn extend(&mut self, low: &[f32], high: &[f32], members: usize) {
         let least = |sides: &[f32]| sides.iter().copied().fold(f32::MAX, f32::min);
         let largest = |sides: &[f32]| sides.iter().copied().fold(f32::MIN, f32::max);
@@ -425,7 +425,7 @@ impl Boxes {
     }
 }
 
-/// Squared distances of `y` from boxes given by their sides, one array an axis.
+/// Squared distances of `y` from boxes given by their sides, one array per axis.
 #[inline(always)]
 fn box_distances<const D: usize>(
     y: &[f32; D],
@@ -444,7 +444,7 @@ fn box_distances<const D: usize>(
     }
 }
 
-/// Orders `rows` so that blocks of [`LANES`] consecutive ones lie close together.
+/// Orders `rows` so that blocks of [`LANES`] consecutive rows are compact.
 fn split<const D: usize>(points: &[[f64; D]], rows: &mut [usize]) {
     if rows.len() <= LANES {
         return;
@@ -466,14 +466,14 @@ fn split<const D: usize>(points: &[[f64; D]], rows: &mut [usize]) {
     split(points, right);
 }
 
-// What the soft assignment does with one block of targets: Gaussians and moments, lane by lane in
-// single precision.
+// The inner loops of the soft assignment over one block of targets: Gaussians and moments, lane by
+// lane in single precision.
 //
-// Plain loops over arrays of one length: closures and iterators in their place are functions of
+// They are plain loops over arrays of equal length. Closures and iterators would be functions of
 // their own, which the compiler does not give the wider registers of their
 // [caller](crate::vectorised).
 
-/// One value a target of a block.
+/// One value per target of a block.
 type Lanes = [f32; LANES];
 
 /// `exp(scale · |t − y|²)` for a block of targets `t`.
@@ -515,7 +515,7 @@ fn add_scaled(sums: &mut Lanes, factor: f32, values: &Lanes) {
     *sums = sum;
 }
 
-/// Sum of all lanes, half and half. Not inlined: the compiler would else arrange the running sums
+/// Sum of all lanes by halves. It is not inlined: otherwise the compiler arranges the running sums
 /// for these few additions rather than for the loop before.
 #[inline(never)]
 fn sum(mut values: Lanes) -> f32 {
@@ -529,7 +529,7 @@ fn sum(mut values: Lanes) -> f32 {
     values[0]
 }
 
-/// Running sums of a row, lane by lane.
+/// Running sums of a row, by lane.
 struct Moments<const D: usize> {
     weight: Lanes,
     shift: [Lanes; D],
@@ -563,7 +563,7 @@ impl<const D: usize> Moments<D> {
     }
 }
 
-/// eˣ for x ≤ 0 to two units of single precision. 0 below −87.
+/// eˣ for x ≤ 0, to two units in the last place of single precision. Zero below −87.
 #[inline(always)]
 fn exp(x: f32) -> f32 {
     const MAGIC: f32 = 12_582_912.0; // 1.5 · 2²³: adding it rounds to the nearest integer

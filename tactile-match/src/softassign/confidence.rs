@@ -9,7 +9,7 @@ use super::{difference, dot, squared, squared_distance};
 use crate::{Doubt, Outliers, linear_assignment};
 use std::f64::consts::TAU;
 
-/// The answer in the frame's units.
+/// The answer in the units of the frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Answer<const D: usize> {
     pub warped: Vec<[f64; D]>,
@@ -22,23 +22,24 @@ pub(super) struct Answer<const D: usize> {
     pub odds: PairOdds,
 }
 
-/// Residuals below this, in radii of the model and in spacings, are what the prior's factor leaves
-/// out: the data are clean.
+/// Residuals below these limits, in radii of the model and in spacings, are the truncation error of
+/// the prior's factor: the data are clean.
 const CLEAN_SIGMA: [f64; 2] = [3e-3, 0.05];
-/// The same for the lowest temperature of a run: partners a twentieth of a spacing apart are told.
+/// Corresponding limits for the lowest temperature of a run: partners a twentieth of a spacing
+/// apart are distinguished.
 const MIN_SIGMA: [f64; 2] = [1e-3, 1.0 / 60.0];
-/// Residuals are compared no finer than this. By the radius alone, a set of 20,000 points would be
-/// compared no finer than its spacing, at which no answer is likelier than chance.
+/// Resolution at which residuals are compared. If it depended on the radius alone, a set of 20,000
+/// points would be compared at its spacing, where no answer is likelier than chance.
 const ENERGY_RESOLUTION: [f64; 2] = [0.01, 0.2];
-/// An answer is read at so many times the lowest temperature at least: what the prior's factor
-/// leaves out must not cost a clean pair its match.
+/// An answer is read at this multiple of the lowest temperature or above: the truncation of the
+/// prior's factor must not cost a clean pair its match.
 const READ: f64 = 1.4;
-/// Least logarithm, a point, of how much more likely an answer makes the targets than chance does:
-/// wrong basins come to less than nothing.
+/// Minimum log-likelihood gain per point over a uniform target distribution. Wrong basins have a
+/// negative gain.
 pub(super) const MIN_TELLING_GAIN: f64 = 0.2;
 
 impl<const D: usize> Annealer<D> {
-    /// Sets what noise is told from what the prior leaves out, for points this far apart.
+    /// Sets the limits that separate noise from the truncation of the prior, for this spacing.
     pub(super) fn set_resolution(&mut self, spacing: f64) {
         let least = |[radii, spacings]: [f64; 2]| radii.min(spacings * spacing);
         self.clean_sigma = least(CLEAN_SIGMA);
@@ -47,27 +48,29 @@ impl<const D: usize> Annealer<D> {
     }
 }
 
-/// Spread of the soft partners, relative to the temperature, from which on the pairs are not decided,
-/// however sure each is beside the others. At 0.45 nineteen of twenty are right, at 0.55 a surface of
-/// 5,000 points has slipped along itself (`--example large_sets -- 5000 surface 0.002 0.1`).
+/// Spread of the soft partners, relative to the temperature, above which the pairs are undecided,
+/// however high their individual confidences. At 0.45 nineteen of twenty pairs are correct; at 0.55
+/// a surface of 5,000 points has slipped along itself
+/// (`--example large_sets -- 5000 surface 0.002 0.1`).
 const MOST_AMBIGUOUS: f64 = 0.5;
 
-/// Whether parts of one set are out of sight or strewn about.
+/// Whether parts of one set are occluded or randomly scattered.
 pub(super) fn are_unequal(model: usize, target: usize) -> bool {
-    // Where the smaller set has less than this share of the larger one's points, parts are out of
-    // sight or strewn about: its edges draw what lies behind them a point aside, and an answer
-    // leaves no doubt only where it makes the targets so much likelier than chance. Less misses
-    // more of such shifts, more costs noisy scenes further starts (`--example confidence`).
+    // If the smaller set has less than this fraction of the larger set's points, parts are occluded
+    // or scattered. The edge of the smaller set then attracts the points behind it, and the match
+    // can shift by one point. An answer is accepted without doubt only if its likelihood gain is
+    // high. A smaller limit misses more of these shifts; a larger one costs noisy scenes further
+    // starts (`--example confidence`).
     (model.min(target) as f64) < 0.95 * model.max(target) as f64
 }
 
-/// Most costs of a completion: 8 MB, and a tenth of a second.
+/// Maximum number of costs in a completion: 8 MB and a tenth of a second.
 const MAX_COMPLETED: usize = 1_000_000;
 
 impl<const D: usize> Answer<D> {
-    /// Why the pairs are not to be relied on. `smaller` points could have a partner, `share` of
-    /// them are expected to have none. `gain` is the logarithm, a point, of how much more likely
-    /// the answer makes the targets than chance does.
+    /// Why the pairs are not reliable. `smaller` is the number of points that could have a partner,
+    /// and `share` the fraction of them expected to have none. `gain` is the log-likelihood gain
+    /// per point over a uniform target distribution.
     pub(super) fn doubt(
         &self,
         smaller: usize,
@@ -77,20 +80,20 @@ impl<const D: usize> Answer<D> {
     ) -> Option<Doubt> {
         let tail = state.tail;
         let pairs = self.assignment.iter().flatten().count() as f64;
-        // An answer with fewer pairs, relative to the smaller set, may be one of chance: wrong
-        // basins of sets that were stretched or turned matched up to two fifths. The same where the
+        // An answer with fewer pairs, relative to the smaller set, may be a chance result: wrong
+        // basins of stretched or rotated sets matched up to two fifths. The limit falls if the
         // caller expects most points to have no partner.
         let enough = 0.55_f64.min(1.0 - 1.5 * share).max(0.1);
         if pairs < enough * smaller as f64 {
             return Some(Doubt::FewPairs);
         }
-        // Trades false alarms for silence: of 912 held-out answers (`--example confidence -- 100
-        // 6`) 39 right ones are doubted and 10 of 235 wrong ones are not. When it was chosen it
-        // was 37 and 10, and 22 and 13 at 0.4.
+        // This limit trades false alarms for missed ones: of 912 held-out answers
+        // (`--example confidence -- 100 6`), 39 correct ones are doubted and 10 of 235 wrong ones
+        // are not. When the limit was chosen, the numbers were 37 and 10, and 22 and 13 at 0.4.
         if self.risk(smaller, gain, tail) < 0.25 && state.ambiguity < MOST_AMBIGUOUS {
             return None;
         }
-        // That large a tail is of a part of the set that lies aside.
+        // So large a tail comes from a displaced part of the set.
         let misfit = gain < MIN_TELLING_GAIN || tail > 0.08;
         Some(if misfit {
             Doubt::LargeResiduals
@@ -99,10 +102,10 @@ impl<const D: usize> Answer<D> {
         })
     }
 
-    /// Probability that fewer than nine in ten pairs are right. Logistic in the share of wrong
-    /// pairs and of missed ones by their confidences, in the gain, and in the tail. Fitted to the
-    /// scenes of `--example confidence`, seeds 0 to 5, and every second one of Chui and
-    /// Rangarajan's published sets.
+    /// Probability that fewer than nine in ten pairs are correct. It is logistic in the fractions
+    /// of wrong and of missed pairs by their confidences, in the gain, and in the tail. It was
+    /// fitted to the scenes of `--example confidence`, seeds 0 to 5, and to every second one of
+    /// Chui and Rangarajan's published sets.
     fn risk(&self, smaller: usize, gain: f64, tail: f64) -> f64 {
         let rows = self.assignment.iter().zip(&self.confidence);
         let without = rows.filter(|(partner, _)| partner.is_none());
@@ -113,7 +116,7 @@ impl<const D: usize> Answer<D> {
         1.0 / (1.0 + (-logit).exp())
     }
 
-    /// Mean confidence of the pairs. 1 where there are none.
+    /// Mean confidence of the pairs. 1 if there are none.
     pub(super) fn sureness(&self) -> f64 {
         let paired = self.assignment.iter().zip(&self.confidence);
         let (mut pairs, mut sure) = (0.0, 0.0);
@@ -124,22 +127,22 @@ impl<const D: usize> Answer<D> {
         if pairs > 0.0 { sure / pairs } else { 1.0 }
     }
 
-    /// Lowers the confidences of an answer with a doubt. Each is the probability that the pair is
-    /// right, were all others; this one is that it is right. `gain` is the logarithm, a point, of
-    /// how much more likely the answer makes the targets than chance does.
+    /// Lowers the confidences of a doubtful answer. Before, each is the probability that the pair
+    /// is correct if all others are; afterwards it is unconditional. `gain` is the log-likelihood
+    /// gain per point over a uniform target distribution.
     pub(super) fn lower_confidences(&mut self, doubt: Doubt, gain: f64) {
-        // The probability that the answer as a whole is right is logistic in the gain and in the
-        // mean confidence. A power stands for noise that is larger than estimated. Fitted to every
-        // second of some 570 answers with a doubt: of the scenes of `--example confidence`, seeds 0
-        // to 7, which shows what they are worth, and of Chui and Rangarajan's published sets.
+        // The probability that the answer as a whole is correct is logistic in the gain and in the
+        // mean confidence. The power accounts for noise that is larger than estimated. Both were
+        // fitted to every second of about 570 doubtful answers: from the scenes of
+        // `--example confidence`, seeds 0 to 7, which reports their calibration, and from Chui and
+        // Rangarajan's published sets.
         let few = f64::from(u8::from(doubt == Doubt::FewPairs));
         let logit = -0.61 + 7.1 * gain.min(1.0) + 4.1 * self.sureness() - 1.4 * few;
         let logistic = 0.96 / (1.0 + (-logit).exp());
         let (whole, power) = match doubt {
-            // The answer that explains the targets better is another one. One pair in fifty is
-            // right all the same.
+            // Another answer fits the targets better. One pair in fifty is correct nevertheless.
             Doubt::Turned | Doubt::Mirrored => (0.02, 1.0),
-            // Two answers or more are as good.
+            // Two or more answers fit equally well.
             Doubt::Symmetric | Doubt::Repeats { .. } => (0.5, 1.0),
             Doubt::FewPairs | Doubt::Undecided | Doubt::LargeResiduals => (logistic, 1.42),
         };
@@ -148,8 +151,8 @@ impl<const D: usize> Answer<D> {
         }
     }
 
-    /// Reads the answer from the run's final state. `spread` is the variance of the positions
-    /// between the scales of the prior, empty where there is one scale. `gain` is that of the
+    /// Reads the answer from the final state of the run. `spread` is the variance of the positions
+    /// between the scales of the prior, empty if there is one scale. `gain` is the gain of the
     /// answer over chance, see [`SoftassignWorkspace::gain`](super::SoftassignWorkspace).
     pub(super) fn read(
         &mut self,
@@ -169,15 +172,15 @@ impl<const D: usize> Answer<D> {
             READ * annealer.least_sigma
         };
         let variance = state.sigma.max(least).powi(2);
-        // Soft matches are read with weights raised to this power. Scaling rows and columns tells
-        // two points that may be swapped apart by half the logarithm of the odds that the whole
-        // permutations have. The power makes up for it. The confidences of pairs are told by
+        // Soft matches are read with weights raised to this power. After scaling of rows and
+        // columns, the log-odds of two points that may be swapped are half of those of the whole
+        // permutations; the power compensates for this. The confidences of pairs come from
         // [`PairOdds`].
         let (sweeps, sharpness) = if noisy { (8, 1.55) } else { (3, 1.0) };
         annealer.assign(&state.warped, variance, slack, sweeps, sharpness);
         annealer.soft.cap_rows();
         self.assign(&annealer.soft, n, targets.len());
-        // A rigid motion leaves residuals, however small.
+        // A rigid motion always leaves residuals, so its points are not moved onto their targets.
         let snaps = !noisy && !annealer.rigid.is_active();
         let fit = self.place(state, targets, snaps);
         if !annealer.rigid.is_active() {
@@ -196,14 +199,14 @@ impl<const D: usize> Answer<D> {
         self.variance.clear();
         for i in 0..n {
             let of_warp = annealer.regression.variance[i] + spread.get(i).copied().unwrap_or(0.0);
-            // A point that was put onto its target shares the target's error.
+            // A point that was moved onto its target has the target's error.
             let on_target = snaps && self.assignment[i].is_some();
             self.variance.push(if on_target { fit } else { of_warp });
         }
     }
 
-    /// Takes out pairs that moved farther than is allowed, and completes the pairs where every point
-    /// of the smaller set, or of one side, has a partner.
+    /// Removes pairs that moved farther than allowed. Completes the pairs if every point of the
+    /// smaller set, or of one side, has a partner.
     pub(super) fn finish(
         &mut self,
         outliers: Outliers,
@@ -247,13 +250,13 @@ impl<const D: usize> Answer<D> {
         };
         for (&i, column) in left.iter().zip(pairs) {
             if let Some(column) = column {
-                // The likeliest of what is left, which the soft matches do not prefer.
+                // The likeliest of the remaining targets, which the soft matches do not prefer.
                 (self.assignment[i], self.confidence[i]) = (Some(open[column]), 0.5);
             }
         }
     }
 
-    /// Pairs that prefer each other to every rival and to having no partner.
+    /// Pairs points that prefer each other to every rival and to having no partner.
     fn assign(&mut self, soft: &SoftAssignment<D>, n: usize, m: usize) {
         self.column_best.clear();
         self.column_best.resize(m, (0.0, usize::MAX));
@@ -280,8 +283,8 @@ impl<const D: usize> Answer<D> {
         }
     }
 
-    /// The positions, on their targets where it `snaps`. The variance, along one axis, of what the
-    /// warp alone leaves to the targets.
+    /// Sets the positions, on their targets if `snaps`. Returns the variance, along one axis, of
+    /// the residuals of the warp alone.
     fn place(&mut self, state: &State<D>, targets: &[[f64; D]], snaps: bool) -> f64 {
         self.warped.clone_from(&state.warped);
         let (mut left, mut squares, mut pairs) = (0.0, 0.0, 0);
@@ -300,57 +303,57 @@ impl<const D: usize> Answer<D> {
     }
 }
 
-// How sure a pair is: the odds of the assignments that take it apart.
+// Confidence of a pair: the odds of the assignments that break it.
 //
-// Among noisy points a pair can be wrong in a few ways: two pairs have each other's targets, a
-// point belongs to a target that is left over, a point that is left over belongs to the pair's
-// target, or the pair has met by chance. With `rᵢ = tⱼ − ŷᵢ` about where the *other* points put
-// point i, with the variance `σ²(1 + oᵢ)`, the evidence changes in closed form. Where i goes to a
-// target that is δ away from its own,
+// Among noisy points a pair can be wrong in a few ways: two pairs have swapped targets, the point
+// belongs to an unpaired target, an unpaired point belongs to the pair's target, or the pair is a
+// coincidence. Let `rᵢ = tⱼ − ŷᵢ` be the residual from the prediction of point i by the *other*
+// points, with the variance `σ²(1 + oᵢ)`. Then the evidence changes in closed form. If i moves to a
+// target at the offset δ from its own,
 //
 // `ΔEᵢ(δ) = [δ·rᵢ + ½ |δ|²]/σ²(1 + oᵢ)`;
 //
-// where i and k exchange targets that are δ apart, `ΔE = ΔEᵢ(δ) + ΔE_k(−δ) + |δ|² c_ik/σ⁴` with the
-// posterior covariance `c_ik` of their positions. The changes exclude each other, and
-// what they share with changes elsewhere cancels to first order: the pair is right with the
-// probability `1/(1 + Σ exp(−ΔE))`. Unlike the entries of the doubly stochastic matrix, which tell
-// two points that may be exchanged apart by half their odds, these are shares of right pairs
-// (`--example confidence`).
+// if i and k exchange targets at the offset δ, `ΔE = ΔEᵢ(δ) + ΔE_k(−δ) + |δ|² c_ik/σ⁴` with the
+// posterior covariance `c_ik` of their positions. The changes exclude each other, and their
+// correlation with changes elsewhere cancels to first order. The pair is therefore correct with the
+// probability `1/(1 + Σ exp(−ΔE))`. In the doubly stochastic matrix, the log-odds of two points
+// that may be exchanged are only half as large; these probabilities are calibrated fractions of
+// correct pairs (`--example confidence`).
 
-/// A point whose own target decides its position is not free of it altogether.
+/// Upper limit of the leverage: even a point that determines its own position keeps some freedom.
 const MAX_OWN_LEVERAGE: f64 = 0.95;
-/// The variance of what the other points say of it is at most so many times the noise's.
+/// Maximum variance of the prediction by the other points, relative to the noise variance.
 const MOST_OTHERS: f64 = MAX_OWN_LEVERAGE / (1.0 - MAX_OWN_LEVERAGE);
-/// Squared residuals beyond so many variances are no partner's: one in a thousand Gaussian ones is,
-/// in the plane and in space.
+/// A pair is rejected if its squared residual exceeds this number of variances. By chance one
+/// Gaussian residual in a thousand does, in the plane and in space.
 const MAX_SQUARED_RESIDUAL: f64 = 16.0;
 
-/// Memory of the odds.
+/// Working memory of the odds.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PairOdds {
     /// Target of each model row.
     partners: Vec<Option<usize>>,
-    /// Rows whose partner cannot be told, see 0.02.
+    /// Rows whose partner cannot be determined, see [`Self::is_hopeless`].
     hopeless: Vec<bool>,
     /// Model row of each target.
     owners: Vec<Option<usize>>,
-    /// Pairs of points that are left over on both sides: squared distance, rows.
+    /// Pairs of points unpaired on both sides: squared distance and rows.
     open: Vec<(f64, usize, usize)>,
     leverages: Vec<Leverage>,
     /// Sum of the odds against each pair.
     against: Vec<f64>,
 }
 
-/// What a fit with soft weights says of a point that is matched for certain.
+/// Leverage of a point with a certain match, derived from a fit with soft weights.
 #[derive(Clone, Copy, Debug)]
 struct Leverage {
-    /// Residual of the prediction by the other points over that of the fit.
+    /// Residual of the prediction by the other points, over the residual of the fit.
     stretch: f64,
-    /// Variance of where the other points put this one, over that of the noise.
+    /// Variance of the prediction by the other points, over the noise variance.
     others: f64,
 }
 
-/// What pairs are judged by.
+/// The fit by which pairs are judged.
 #[derive(Clone, Copy)]
 struct Fitted<'a, const D: usize> {
     annealer: &'a Annealer<D>,
@@ -362,7 +365,7 @@ struct Fitted<'a, const D: usize> {
 
 impl PairOdds {
     /// Replaces `assignment` by the likeliest one in its neighbourhood, and sets the `confidence`
-    /// of every pair. That of points without a partner stays.
+    /// of each pair. The confidence of points without a partner is not changed.
     fn weigh<const D: usize>(
         &mut self,
         fitted: Fitted<'_, D>,
@@ -371,7 +374,7 @@ impl PairOdds {
     ) {
         self.take(fitted, assignment);
         self.complete(fitted);
-        // Rounds of exchanges until none makes the pairs likelier: one or two are needed.
+        // Repeat the exchanges until none increases the likelihood: one or two rounds are enough.
         for _ in 0..4 {
             if !self.exchange(fitted) {
                 break;
@@ -383,15 +386,15 @@ impl PairOdds {
             let wanted = if partner.is_some() {
                 0.3
             } else {
-                // Points that the soft matches leave without a partner get the likeliest one where
-                // it is surer than this, and others keep theirs where it is surer than that.
+                // Points without a partner in the soft matches get the likeliest one if its
+                // probability is above this; the others keep theirs if it is above this.
                 0.5
             };
             if self.partners[i].is_some() && sure > wanted {
                 *partner = self.partners[i];
                 confidence[i] = sure;
             } else if partner.take().is_some() {
-                confidence[i] = 0.5; // undecided whether it has one
+                confidence[i] = 0.5; // it is undecided whether the point has a partner
             }
         }
     }
@@ -426,8 +429,8 @@ impl PairOdds {
             }));
     }
 
-    /// Pairs what is left over on both sides, nearest first: what the soft matches leave undecided
-    /// mostly has a partner.
+    /// Pairs the points unpaired on both sides, nearest first: most points that the soft matches
+    /// leave undecided have a partner.
     fn complete<const D: usize>(&mut self, fitted: Fitted<'_, D>) {
         self.open.clear();
         for (i, partner) in self.partners.iter().enumerate() {
@@ -454,11 +457,12 @@ impl PairOdds {
         }
     }
 
-    /// Makes for every point the change that makes the pairs likeliest. Whether there was any.
+    /// Makes for each point the change that raises the likelihood most. Returns whether any change
+    /// was made.
     fn exchange<const D: usize>(&mut self, fitted: Fitted<'_, D>) -> bool {
         let mut changed = false;
         for i in (0..self.partners.len()).filter(|&i| !self.hopeless[i]) {
-            // A change counts as one for the better from this on: rounding is less.
+            // A change must improve the energy by more than this, which is above rounding.
             let mut best = (-1e-9, None);
             for j in fitted.candidates(i) {
                 let change = match (self.partners[i], self.owners[j]) {
@@ -486,10 +490,11 @@ impl PairOdds {
         changed
     }
 
-    /// Sums the odds of the changes that take each pair apart.
+    /// Sums the odds of the changes that break each pair.
     fn add_odds<const D: usize>(&mut self, fitted: Fitted<'_, D>) {
         let pairs = self.partners.iter().flatten().count() as f64;
-        // Half a point more on either side: none left over of a few does not exclude that one is.
+        // Add half a point on either side: that none of a few is unpaired does not exclude that one
+        // is.
         let left_model = (self.partners.len() as f64 - pairs + 0.5) / (pairs + 0.5);
         let left_target = (fitted.targets.len() as f64 - pairs + 0.5) / fitted.annealer.volume;
         let scale = left_model * left_target * (TAU * fitted.variance).powf(0.5 * D as f64);
@@ -515,7 +520,7 @@ impl PairOdds {
                     against += alone;
                     continue;
                 };
-                // Either point may take the other's target and leave that one without.
+                // Either point may take the other's target and leave the other without one.
                 let theirs = scale * self.misfit(fitted, (k, j)).exp();
                 let taken = (-self.of_move(fitted, (k, j), own)).exp();
                 against += (-self.of_exchange(fitted, (i, own), (k, j))).exp()
@@ -526,26 +531,26 @@ impl PairOdds {
         }
     }
 
-    /// From where the other points put the point of a pair to its target.
+    /// Offset of a pair's target from the prediction of its point by the other points.
     fn residual<const D: usize>(&self, fitted: Fitted<'_, D>, (i, j): (usize, usize)) -> [f64; D] {
         let stretch = self.leverages[i].stretch;
         fitted.offset(i, j).map(|c| stretch * c)
     }
 
-    /// Variance of that, over the noise's.
+    /// Variance of [`residual`](Self::residual), over the noise variance.
     fn variance(&self, i: usize) -> f64 {
         1.0 + self.leverages[i].others.min(MOST_OTHERS)
     }
 
-    /// Minus the logarithm of a target's density about where the others put its point, beside that
-    /// of a point without noise.
+    /// Negative log-density of a target about the prediction of its point by the others, relative
+    /// to that of a point without noise.
     fn misfit<const D: usize>(&self, fitted: Fitted<'_, D>, pair: (usize, usize)) -> f64 {
         let variance = self.variance(pair.0);
         let square = squared(&self.residual(fitted, pair)) / (fitted.variance * variance);
         0.5 * (square.min(MAX_SQUARED_RESIDUAL) + D as f64 * variance.ln())
     }
 
-    /// Change of the energy where point i of a pair goes to the target j.
+    /// Change of the energy if point i of a pair moves to target j.
     fn of_move<const D: usize>(
         &self,
         fitted: Fitted<'_, D>,
@@ -558,7 +563,7 @@ impl PairOdds {
         (dot(&step, &residual) + 0.5 * squared(&step)) / variance
     }
 
-    /// Change of the energy where two pairs exchange their targets.
+    /// Change of the energy if two pairs exchange their targets.
     fn of_exchange<const D: usize>(
         &self,
         fitted: Fitted<'_, D>,
@@ -566,15 +571,15 @@ impl PairOdds {
         (k, theirs): (usize, usize),
     ) -> f64 {
         let least = self.of_move(fitted, (i, own), theirs) + self.of_move(fitted, (k, theirs), own);
-        // Odds fainter than this do not count.
+        // Odds below this are negligible.
         if least > -1e-4_f64.ln() {
-            return least; // neighbours move together, so that there is more to come
+            return least; // neighbours move together, which can only add to the change
         }
         let together = fitted.annealer.regression.covariance(i, k) / fitted.variance;
         least + squared(&fitted.step(own, theirs)) * together / fitted.variance
     }
 
-    /// Change of the energy where point i, which is left over, takes the target of a pair.
+    /// Change of the energy if the unpaired point i takes the target of a pair.
     fn of_takeover<const D: usize>(
         &self,
         fitted: Fitted<'_, D>,
@@ -588,29 +593,29 @@ impl PairOdds {
 }
 
 impl<const D: usize> Fitted<'_, D> {
-    /// From where the warp puts point i to target j.
+    /// Offset of target j from the warped position of point i.
     fn offset(&self, i: usize, j: usize) -> [f64; D] {
         difference(&self.targets[j], &self.warped[i])
     }
 
-    /// Whether point i has a partner that nothing tells from others.
+    /// Whether no candidate of point i stands out from the others.
     fn is_hopeless(&self, i: usize) -> bool {
         let soft = &self.annealer.soft;
-        // A point whose likeliest target has less than one chance in fifty has no partner that
-        // could be told: its confidence would be far below 0.3. Of large sets whose noise exceeds
-        // their spacing these are nearly all points, with hundreds of candidates each.
+        // If the likeliest target of a point has a probability below 0.02, its partner cannot be
+        // determined: the confidence would be far below 0.3. In large sets whose noise exceeds
+        // their spacing, this holds for nearly all points, with hundreds of candidates each.
         soft.moments.weight[i] > 0.5 && soft.entries(i).all(|(_, p)| p < 0.02)
     }
 
-    /// Targets that point i could belong to.
+    /// Candidate targets of point i.
     fn candidates(&self, i: usize) -> impl Iterator<Item = usize> + '_ {
         let entries = self.annealer.soft.entries(i);
-        // Targets with fainter soft matches, some five standard deviations of the noise away, are
-        // not looked at.
+        // Targets with smaller soft matches, about five standard deviations of the noise away, are
+        // skipped.
         entries.filter(|&(_, p)| p > 1e-9).map(|(j, _)| j)
     }
 
-    /// From one target to another.
+    /// Offset from one target to another.
     fn step(&self, from: usize, to: usize) -> [f64; D] {
         difference(&self.targets[to], &self.targets[from])
     }

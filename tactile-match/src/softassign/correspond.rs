@@ -1,4 +1,5 @@
-//! Pairs from the points' surroundings: shape contexts propose, relaxation labelling decides.
+//! Pairs from the surroundings of the points: shape contexts propose candidates, relaxation
+//! labelling decides.
 
 use super::{difference, dot, squared, squared_distance};
 use crate::shape_context::ShapeContexts;
@@ -6,10 +7,10 @@ use std::f64::consts::PI;
 
 /// Radius of the shape contexts, in radii of the model.
 const RADIUS: f64 = 2.0;
-/// Initial share and constant gain of the slack.
+/// Initial weight and constant gain of the slack.
 const SLACK: f64 = 0.1;
 
-/// Memory of the search for pairs.
+/// Working memory of the search for pairs.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Correspondence {
     model_contexts: ShapeContexts,
@@ -19,12 +20,12 @@ pub(super) struct Correspondence {
     labels: CandidateLabels,
     neighbours: Vec<usize>,
     reach: Vec<f64>,
-    /// The likeliest target of every model point, with its probability.
+    /// The likeliest target of each model point, with its probability.
     pub(super) pairs: Vec<(usize, f64)>,
 }
 
 impl Correspondence {
-    /// Finds `pairs` for model points as they lie.
+    /// Finds `pairs` for model points in place.
     pub(super) fn find<const D: usize>(&mut self, model: &[[f64; D]], target: &[[f64; D]]) {
         self.propose(model, target);
         self.relax(model, target);
@@ -38,7 +39,7 @@ impl Correspondence {
         self.pairs.extend((0..model.len()).map(likeliest));
     }
 
-    /// The candidates of least shape-context cost, with first probabilities.
+    /// Selects the candidates with the lowest shape-context cost, with first probabilities.
     fn propose<const D: usize>(&mut self, model: &[[f64; D]], target: &[[f64; D]]) {
         self.model_contexts.build(model, RADIUS);
         self.target_contexts.build(target, RADIUS);
@@ -49,7 +50,7 @@ impl Correspondence {
             let costs = &self.costs;
             self.order.clear();
             self.order.extend(0..target.len());
-            // Candidates a model point.
+            // Candidates per model point.
             let kept = 10.min(target.len());
             if kept < self.order.len() {
                 let by_cost = |a: &usize, b: &usize| costs[*a].total_cmp(&costs[*b]).then(a.cmp(b));
@@ -61,7 +62,7 @@ impl Correspondence {
                 .iter()
                 .map(|&j| costs[j])
                 .fold(f32::MAX, f32::min);
-            // χ² distance that costs a candidate a factor e.
+            // A χ² distance larger by 0.05 lowers the probability by a factor e.
             let raw = |j: usize| (-f64::from(costs[j] - least) / 0.05).exp();
             let sum: f64 = self.order.iter().map(|&j| raw(j)).sum();
             self.labels.push_row(
@@ -98,9 +99,10 @@ impl Correspondence {
         }
     }
 
-    /// Lists the nearest neighbours of every model point and the distance to the farthest of them.
+    /// Lists the nearest neighbours of each model point. Returns the number of neighbours per
+    /// point.
     fn find_neighbours<const D: usize>(&mut self, model: &[[f64; D]]) -> usize {
-        // Neighbours a model point.
+        // Neighbours per model point.
         let kept = 8.min(model.len() - 1);
         self.neighbours.clear();
         self.reach.clear();
@@ -126,8 +128,8 @@ impl Correspondence {
     }
 }
 
-/// αβ⁴ of two edges: (15) with the maximum of the pair, (16) sharpened, because a neighbourhood's
-/// edges differ in direction more than in length.
+/// αβ⁴ of two edges: (15) with the maximum per pair, and (16) to the fourth power, because the
+/// edges of a neighbourhood differ in direction more than in length.
 fn compatibility<const D: usize>(u: &[f64; D], v: &[f64; D]) -> f64 {
     let (p, q) = (squared(u).sqrt(), squared(v).sqrt());
     if p == 0.0 || q == 0.0 {
@@ -141,10 +143,10 @@ fn compatibility<const D: usize>(u: &[f64; D], v: &[f64; D]) -> f64 {
 // Relaxation labelling over candidates: the paper's update (19)–(20) as a sparse matrix–vector
 // product.
 //
-// Only some pairs `(i, j)` are candidates; the match matrix is kept for those and for the slack.
-// What pair `(a, b)` says for pair `(i, j)` does not depend on M: these links are computed once,
-// and a sweep costs one multiplication a link instead of `O(I J A B)`. With all pairs as candidates
-// the numbers are those of [`labelling`](crate::labelling).
+// Only some pairs `(i, j)` are candidates; the match matrix stores these pairs and the slack. The
+// contribution of pair `(a, b)` to pair `(i, j)` does not depend on M: these links are computed
+// once, and a sweep costs one multiplication per link instead of `O(I J A B)`. With all pairs as
+// candidates the numbers are those of [`labelling`](crate::labelling).
 
 /// The match matrix over candidate pairs, with the links between them.
 #[derive(Clone, Debug, Default)]
@@ -162,7 +164,7 @@ struct CandidateLabels {
 }
 
 impl CandidateLabels {
-    /// Forgets everything but the memory.
+    /// Clears all values and keeps the memory.
     fn reset(&mut self, targets: usize, slack: f64) {
         self.starts.clear();
         self.starts.push(0);
@@ -183,8 +185,8 @@ impl CandidateLabels {
         self.row_slack.push(slack);
     }
 
-    /// Computes the links: `weight((i, j), (a, b))` for the points `a` of `neighbours(i)` and their
-    /// candidates; zeros are left out.
+    /// Computes the links `weight((i, j), (a, b))` for the points `a` of `neighbours(i)` and their
+    /// candidates. Zeros are dropped.
     fn link<'a>(
         &mut self,
         weight: impl Fn((usize, usize), (usize, usize)) -> f64,
@@ -252,7 +254,8 @@ impl CandidateLabels {
         (0..normalisations).for_each(|_| self.normalise());
     }
 
-    /// Whether every model point is decided: one candidate, or the slack, has at least `certainty`.
+    /// Whether every model point is decided: one candidate, or the slack, has a probability of at
+    /// least `certainty`.
     fn is_settled(&self, certainty: f64) -> bool {
         (0..self.rows()).all(|i| {
             self.row(i)

@@ -1,4 +1,5 @@
-//! Residuals below what the annealing resolves: are they noise, and where do the points go then?
+//! Residuals below the resolution of the annealing: decides whether they are noise, and places the
+//! points accordingly.
 
 use super::run::State;
 use super::search::is_cold;
@@ -10,19 +11,20 @@ use crate::kernels::cholesky;
 use nalgebra::{Matrix4, Matrix4x3, RowVector4, SVector};
 use tactile_core::{statistics::median, vectorised};
 
-// An annealing run ends at a thousandth of the radius, since the factor of its prior leaves out as
-// much. Pairs are decided there, and what is left is either the rounding of clean data or noise.
-// With hard pairs `zᵢ` the model is a full Gaussian process with free affine part,
-// `cov z = τ²(K + λ 1)`. Its restricted likelihood (Patterson & Thompson, Biometrika 58, 1971),
-// with τ profiled out, is that of λ and of the shape of K alone:
+// An annealing run ends at a thousandth of the radius, because the factor of its prior has a
+// truncation error of this size. The pairs are decided there, and the remaining residuals are
+// either the rounding of clean data or noise. With hard pairs `zᵢ` the model is a full Gaussian
+// process with a free affine part, `cov z = τ²(K + λ 1)`. Its restricted likelihood (Patterson &
+// Thompson, Biometrika 58, 1971), with τ profiled out, depends only on λ and the shape of K:
 //
 // `−ln p = ½ [M ln S + D (ln det C + ln det PᵀC⁻¹P)]`, `C = K + λ 1`, `S = zᵀ B z`,
 // `B = C⁻¹ − C⁻¹P (PᵀC⁻¹P)⁻¹ PᵀC⁻¹`, `M = D (n − D − 1)`.
 //
-// Clean data of a field that bends take the least λ, under a rough covariance if under no other.
+// For clean data of a bending field the smallest λ is the likeliest, if necessary with a rough
+// covariance.
 
-/// Shapes of the covariance by likelihood: Gaussian of a length in radii, and one of Matérn's whose
-/// fields have one derivative, for clean fields that no Gaussian resolves.
+/// Shapes of the covariance in the order of trial: Gaussians of a length in radii, and a Matérn
+/// covariance whose fields have one derivative, for clean fields that no Gaussian resolves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Shape {
     Gaussian(f64),
@@ -38,14 +40,14 @@ const SHAPES: [Shape; 6] = [
     Shape::Matern(2.0),
 ];
 
-/// Pairs whose likelihood decides about the noise: the 60 next to the centre. Their noise is known
-/// to 7 %, and twice as many take eight times as long.
+/// Number of pairs whose likelihood decides about the noise: the 60 nearest to the centre. They
+/// determine the noise to 7 %; twice as many take eight times as long.
 const PATCH: usize = 60;
 
-/// Sets up to this size are fitted as a whole: a dense system of theirs takes a tenth of a second.
+/// Sets up to this size are fitted as a whole: their dense system takes a tenth of a second.
 const MAX_WHOLE: usize = 600;
 
-/// λ = 4ᵏ: from the rounding of the covariances to where a field is affine beside its noise.
+/// λ = 4ᵏ, from the rounding of the covariances to a field that is affine compared with its noise.
 const POWERS: std::ops::RangeInclusive<i32> = -20..=6;
 
 impl Shape {
@@ -60,14 +62,14 @@ impl Shape {
     }
 }
 
-/// Memory of the fit, and its answer.
+/// Working memory of the fit, and its result.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FineFit<const D: usize> {
     /// Whether there is noise, also in sets that are too large to be fitted as a whole.
     pub(super) found: bool,
-    /// Standard deviation of the noise along an axis, once it was looked for.
+    /// Standard deviation of the noise along an axis. `None` before the search for noise.
     pub(super) sigma: Option<f64>,
-    /// Variance of the positions along an axis. Empty where the positions are not the fit's.
+    /// Variance of the positions along an axis. Empty if the positions do not come from the fit.
     pub(super) variance: Vec<f64>,
     pairs: Vec<(usize, usize)>,
     sample: Vec<(usize, usize)>,
@@ -76,11 +78,11 @@ pub(super) struct FineFit<const D: usize> {
 }
 
 impl AnnealedSoftassign {
-    /// Whether the residuals of decided pairs are noise. Where they are, `ws.best` gets the noise
-    /// and the positions.
+    /// Whether the residuals of decided pairs are noise. If so, `ws.best` gets the noise and the
+    /// positions.
     pub(super) fn resolve<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) -> bool {
         ws.fine.forget();
-        // A dense fit takes many times as long as the one run of a search near by.
+        // A dense fit takes many times as long as the single run of a nearby search.
         let thorough = matches!(self.search, Search::Thorough);
         let bends = thorough && self.transformation == Transformation::Smooth;
         let allowed = self.has(Mechanism::Fine);
@@ -88,7 +90,7 @@ impl AnnealedSoftassign {
         if !bends || !allowed || !(ws.best.sigma <= ws.annealer.clean_sigma || is_cold(ws)) {
             return false;
         }
-        // Those lie this far from their targets at most.
+        // Decided partners are at most this far from their targets.
         let reach = if self.is_exact(ws) {
             0.0
         } else {
@@ -101,14 +103,14 @@ impl AnnealedSoftassign {
         let enough = 0.9 * smaller.min(if whole { f64::INFINITY } else { PATCH as f64 });
         let are_enough = |fine: &FineFit<D>| fine.pairs.len() as f64 >= enough;
         let noisy = are_enough(fine) && fine.are_noisy(sets) && are_enough(fine);
-        // Partners met by chance within that reach look like noise of twice as much at least.
+        // Chance partners within that reach look like noise of at least twice this size.
         let small = reach == 0.0 || fine.sigma.is_some_and(|sigma| sigma < 0.25 * reach);
         if !(noisy && small && whole) {
             return false;
         }
         fine.place(&ws.model, &mut ws.best);
         if ws.best.sigma > ws.annealer.clean_sigma {
-            // The annealing resolves it, and its average over scales errs less.
+            // The annealing resolves this noise, and its average over scales is more accurate.
             ws.best.noisy = false;
             fine.forget();
         }
@@ -116,7 +118,7 @@ impl AnnealedSoftassign {
     }
 }
 
-/// Model, where a start puts it, and targets.
+/// Model, its positions under a start, and targets.
 type Sets<'a, const D: usize> = (&'a [[f64; D]], &'a [[f64; D]], &'a [[f64; D]]);
 
 impl<const D: usize> FineFit<D> {
@@ -126,7 +128,7 @@ impl<const D: usize> FineFit<D> {
     }
 
     /// Mutual nearest neighbours of warped points and targets, of all points or of those next to
-    /// the centre: pairs nearer than `reach` or six times the median.
+    /// the centre. A pair must be nearer than `reach` or six times the median.
     fn pair(&mut self, model: &[[f64; D]], warped: &[[f64; D]], target: &[[f64; D]], reach: f64) {
         self.pairs.clear();
         self.pairs.extend((0..model.len()).map(|i| (i, 0)));
@@ -147,12 +149,12 @@ impl<const D: usize> FineFit<D> {
         self.pairs.retain(|pair| apart(pair) <= limit);
     }
 
-    /// Whether the residuals of the pairs are noise. Pairs that the others contradict leave. Leaves
-    /// the fit of all pairs in `system`.
+    /// Whether the residuals of the pairs are noise. Pairs that contradict the others are dropped.
+    /// The fit of all pairs stays in `system`.
     fn are_noisy(&mut self, sets: Sets<'_, D>) -> bool {
         for _ in 0..3 {
             self.found = false;
-            // Fewer do not tell noise from bending.
+            // Fewer pairs cannot separate noise from bending.
             if self.pairs.len() < 8 * (D + 1) {
                 return false;
             }
@@ -185,7 +187,7 @@ impl<const D: usize> FineFit<D> {
         true
     }
 
-    /// Drops pairs whose residual the noise of the others does not explain. Whether there were any.
+    /// Drops pairs whose residual exceeds the noise of the others. Returns whether any was dropped.
     fn drop_contradicted(&mut self) -> bool {
         let Self {
             system,
@@ -193,11 +195,11 @@ impl<const D: usize> FineFit<D> {
             distances,
             ..
         } = self;
-        // λα has the variance σ²λB where the noise is σ².
+        // λα has the variance σ²λB if the noise is σ².
         let misfit = |row: usize| squared(&system.weights[row]) / system.precision[row];
         distances.clear();
         distances.extend((0..pairs.len()).map(misfit));
-        // One true residual in a million is beyond five standard deviations, by the median.
+        // By the median, one correct residual in a million is beyond five standard deviations.
         let limit = 25.0 / median_of_chi_squared(D) * D as f64 / 2.0 * median(distances);
         let (before, mut row) = (pairs.len(), 0);
         pairs.retain(|_| {
@@ -207,14 +209,14 @@ impl<const D: usize> FineFit<D> {
         pairs.len() < before
     }
 
-    /// Shape and λ of the largest likelihood over the sample. None where the data are clean.
+    /// Shape and λ of the largest likelihood over the sample. `None` if the data are clean.
     fn likeliest(&mut self, sets: Sets<'_, D>) -> Option<(Shape, f64)> {
         let (least, most) = (*POWERS.start(), *POWERS.end());
         let lambda = |k: i32| 4_f64.powi(k);
         let (mut best, mut clean) = ((f64::INFINITY, SHAPES[0], least), f64::INFINITY);
         for shape in SHAPES {
             self.system.take(sets, &self.sample, shape);
-            // What is clean under the first shape is clean, by a few λ.
+            // If the data are clean under the first shape, a few values of λ settle it.
             if shape == SHAPES[0] {
                 let rough = [least, -17, -11, -2].map(|k| self.system.energy(lambda(k)));
                 if !rough[0].is_finite() {
@@ -247,13 +249,13 @@ impl<const D: usize> FineFit<D> {
         self.system.solve(lambda(k));
         let sigma = self.system.noise();
         self.sigma = Some(sigma);
-        // Texts of six digits round to more than that. A likelihood that is not e⁵ times that of
-        // clean data decides nothing.
+        // Coordinates written with six digits round to more than this. A likelihood ratio to clean
+        // data below e⁵ decides nothing.
         let noisy = k > least + 1 && sigma > 1e-6 && energy < clean - 5.0;
         noisy.then_some((shape, lambda(k)))
     }
 
-    /// Puts the points where the fit has them.
+    /// Moves the points to the positions of the fit.
     fn place(&mut self, model: &[[f64; D]], state: &mut State<D>) {
         let sigma = self.system.noise();
         self.sigma = Some(sigma);
@@ -267,7 +269,7 @@ impl<const D: usize> FineFit<D> {
     }
 }
 
-/// Keeps the `count` pairs whose model points are next to the centre.
+/// Keeps the `count` pairs whose model points are nearest to the centre.
 fn centre_first<const D: usize>(model: &[[f64; D]], pairs: &mut Vec<(usize, usize)>, count: usize) {
     if pairs.len() > count {
         pairs.select_nth_unstable_by(count, |&(a, _), &(b, _)| {
@@ -277,14 +279,14 @@ fn centre_first<const D: usize>(model: &[[f64; D]], pairs: &mut Vec<(usize, usiz
     }
 }
 
-/// The dense system of some pairs.
+/// The dense system of the fitted pairs.
 #[derive(Clone, Debug, Default)]
 struct System<const D: usize> {
     shape: Option<Shape>,
     lambda: f64,
     points: Vec<[f64; D]>,
     displacements: Vec<[f64; D]>,
-    /// K, and the factor of C, by rows.
+    /// K, and the factor of C, row by row.
     kernel: Vec<f64>,
     factor: Vec<f64>,
     /// L⁻¹[P z].
@@ -316,7 +318,7 @@ impl<const D: usize> System<D> {
         }
     }
 
-    /// The basis of the affine fields at a point, unit vectors for the dimensions it lacks.
+    /// The basis of the affine fields at a point, with unit vectors for the missing dimensions.
     fn basis(point: &[f64; D]) -> RowVector4<f64> {
         RowVector4::from_fn(|_, c| match c {
             0 => 1.0,
@@ -324,7 +326,7 @@ impl<const D: usize> System<D> {
         })
     }
 
-    /// Factors C and whitens. The quadratic form S and the logarithm of both determinants.
+    /// Factors C and whitens. Returns the quadratic form S and the logarithm of both determinants.
     fn whiten(&mut self, lambda: f64) -> (f64, f64) {
         let n = self.points.len();
         self.lambda = lambda;
@@ -358,29 +360,29 @@ impl<const D: usize> System<D> {
             return (f64::INFINITY, 0.0); // all on a line or plane: no affine part
         };
         (self.normal, self.affine) = (inverse, inverse * moments);
-        // Below that is rounding.
+        // A smaller value is rounding.
         let left = (squares - moments.dot(&self.affine)).max(1e-26);
         (left, log_det + normal.determinant().ln())
     }
 
-    /// Standard deviation of the noise by the likelihood: τ√λ.
+    /// Standard deviation of the noise from the likelihood: τ√λ.
     fn scale(&mut self, lambda: f64) -> f64 {
         let degrees = ((self.points.len() - D - 1) * D) as f64;
         (self.whiten(lambda).0 * lambda / degrees).sqrt()
     }
 
-    /// Minus the logarithm of the restricted likelihood.
+    /// Negative logarithm of the restricted likelihood.
     fn energy(&mut self, lambda: f64) -> f64 {
         let degrees = (self.points.len() - D - 1) as f64;
         let (left, log_det) = self.whiten(lambda);
         0.5 * D as f64 * (degrees * left.ln() + log_det)
     }
 
-    /// Sets α and the diagonal of B: `O(n³)`.
+    /// Computes α and the diagonal of B: `O(n³)`.
     fn solve(&mut self, lambda: f64) {
         let n = self.points.len();
         self.whiten(lambda);
-        // Rows of L⁻ᵀ, one after the other: C⁻¹ = L⁻ᵀ L⁻¹.
+        // Rows of L⁻ᵀ, one by one: C⁻¹ = L⁻ᵀ L⁻¹.
         self.precision.clear();
         self.weights.clear();
         let Self {
@@ -416,14 +418,14 @@ impl<const D: usize> System<D> {
         }
     }
 
-    /// Standard deviation of the noise: residuals over what the fit leaves free.
+    /// Standard deviation of the noise: residuals over the degrees of freedom of the fit.
     fn noise(&self) -> f64 {
         let squares: f64 = self.weights.iter().map(squared).sum();
         let free: f64 = self.precision.iter().sum();
         (self.lambda * squares / (D as f64 * free)).sqrt()
     }
 
-    /// Displacement at a point, and its variance over that of the noise: `O(n²)`.
+    /// Displacement at a point, and its variance relative to the noise: `O(n²)`.
     fn predict(&mut self, point: &[f64; D]) -> ([f64; D], f64) {
         let n = self.points.len();
         let shape = self.shape.unwrap_or(SHAPES[0]);

@@ -1,4 +1,4 @@
-//! Large sets, coarse to fine.
+//! Matching of large sets, from coarse to fine.
 
 use super::assign::Blocks;
 use super::run::{Annealer, Cooling, Schedule, State};
@@ -9,23 +9,24 @@ use super::{
 use crate::gaussian_process::{Axes, Prior};
 use std::ops::ControlFlow;
 
-// Large sets, coarse to fine.
+// Large sets are matched from coarse to fine.
 //
 // One annealing run from a warm start costs `O(I J)`, which is too much for tens of thousands of
-// points. A well-spread sample of either set (every 8ᵏ-th point in the order of a k-d tree) is
-// registered first: its points are not each other's partners, but the field that takes one density
-// onto the other is the whole set's [Hirose, *Acceleration of non-rigid point set registration with
-// downsampling and Gaussian process regression*, IEEE TPAMI 43 (2021)]. The field is extended to a
-// sample eight times as large, which starts no warmer than the coarser sample was dense, and so on
-// to all points. There only targets within a few spacings are looked at: time `O(I r²)` an
-// iteration with r ≤ 64 modes of the prior, memory `O(I r)`.
+// points. So a well-spread sample of either set (every 8ᵏ-th point in the order of a k-d tree) is
+// registered first. The points of the samples are not partners of each other, but the field that
+// maps one density onto the other is that of the whole sets [Hirose, *Acceleration of non-rigid
+// point set registration with downsampling and Gaussian process regression*, IEEE TPAMI 43 (2021)].
+// The field is extended to a sample eight times as large, whose first temperature is at most the
+// spacing of the coarser sample, and so on to all points. There only targets within a few spacings
+// are candidates: the time is `O(I r²)` per iteration with r ≤ 64 modes of the prior, the memory
+// `O(I r)`.
 
-/// Sets of which both have so many points are matched coarse to fine.
+/// If both sets have at least this many points, they are matched coarse to fine.
 pub(super) const LARGE: usize = 4000;
 
-/// Runs that the residuals cool end where residuals and temperature, as variances, differ by less
-/// than this share. A tenth of it takes a tenth more time for the same errors. Ten iterations alone
-/// leave volumes three noise widths from the truth
+/// A run cooled by its residuals ends when the variances of residuals and temperature differ by
+/// less than this fraction. A tenth of it takes a tenth more time for equal errors. A limit of ten
+/// iterations alone leaves volumes three noise widths from the truth
 /// (`--example large_sets -- 20000 volume 0.01 0.2`).
 const STILL: f64 = 1e-3;
 
@@ -35,7 +36,7 @@ impl AnnealedSoftassign {
         ws.model.len().min(ws.target.len()) >= LARGE
     }
 
-    /// Matches sample after sample, each from where the coarser one put it.
+    /// Matches the samples in turn, each from the result of the coarser one.
     pub(super) fn solve_coarse_to_fine<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
@@ -43,7 +44,7 @@ impl AnnealedSoftassign {
     ) -> ControlFlow<()> {
         let smaller = ws.model.len().min(ws.target.len());
         let mut stride = 1;
-        // The coarsest sample has at least so many points: fewer show too little of a set's shape.
+        // Minimum size of the coarsest sample: fewer points represent the shape of a set poorly.
         while smaller / (stride * STEP) >= 500 {
             stride *= STEP;
         }
@@ -78,7 +79,7 @@ impl AnnealedSoftassign {
             flow = self.coarsest(ws, &mut levels, stride, observe);
         }
         while stride > 1 {
-            // First temperature of a level in spacings of the coarser one.
+            // First temperature of a level, in spacings of the coarser level.
             let sigma = 1.0 * ws.spacing;
             stride /= STEP;
             levels.coarse.copy_from(&ws.state);
@@ -90,7 +91,7 @@ impl AnnealedSoftassign {
                 && self.follow_sampled_patterns(ws, &mut levels)
             {
                 self.schedule(Cooling {
-                    // First temperature after the patterns, in spacings.
+                    // First temperature after the block patterns, in spacings.
                     sigma: 0.4 * ws.spacing,
                     ..FAST
                 })
@@ -98,15 +99,16 @@ impl AnnealedSoftassign {
                 self.schedule(Cooling {
                     sigma,
                     least: 1.0,
-                    // Where noise hides the patterns, all points are annealed as the residuals
-                    // decide.
+                    // If noise hides the patterns, all points are annealed with the temperature set
+                    // by the residuals.
                     still: STILL,
                     ..FAST
                 })
             };
             flow = refine(ws, run, flow, observe);
         }
-        // A run colder than the noise has lost pairs: again, as far as the residuals let it cool.
+        // A run below the noise temperature has lost pairs: repeat it with the temperature set by
+        // the residuals.
         let cold =
             ws.state.sigma <= ws.annealer.clean_sigma && ws.state.matched < 0.98 * smaller as f64;
         if cold && stride > 0 {
@@ -121,7 +123,8 @@ impl AnnealedSoftassign {
         let schedule = self.schedule(FAST);
         let noisy = ws.state.sigma > ws.annealer.clean_sigma;
         if flow.is_continue() && noisy {
-            // Rounds in which warp and noise level follow each other at the end of noisy sets.
+            // Number of rounds in which warp and noise level are updated in turn at the end of
+            // noisy sets.
             ws.annealer.settle(&mut ws.state, &schedule, 4);
         }
         ws.levels = levels;
@@ -140,29 +143,30 @@ impl AnnealedSoftassign {
         flow
     }
 
-    /// Puts `ws.state` where local patterns agree it belongs: first those of a few points with
-    /// candidates far away, then those of many with candidates near the field found. False, and no
-    /// change, where they do not agree.
+    /// Moves `ws.state` onto the field on which the local patterns agree: first the patterns of a
+    /// few points with distant candidates, then those of many points with candidates near that
+    /// field. Returns `false` and changes nothing if they do not agree.
     fn follow_sampled_patterns<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
         levels: &mut Levels<D>,
     ) -> bool {
         let mut reach = 8.0 * ws.spacing;
-        // Points whose local patterns are compared first, and how far away their candidates may be:
-        // in spacings, so many times farther where those do not agree on a field, and at most in
-        // radii of the model.
+        // First stage: number of points whose local patterns are compared, and the distance of
+        // their candidates. The distance is in spacings and grows by this factor while the patterns
+        // do not agree on a field; its limit is in radii of the model.
         while !follow_patterns_of(ws, levels, 120, reach.min(MAX_PATTERN_REACH)) {
             if reach >= MAX_PATTERN_REACH {
                 return false;
             }
             reach *= 2.5;
         }
-        // Points and reach, in spacings, of the patterns that make the seeds' field exact.
+        // Second stage: number of points and reach, in spacings, of the patterns that refine this
+        // field.
         follow_patterns_of(ws, levels, 1000, 4.0 * ws.spacing)
     }
 
-    /// Sets up targets, prior and spacing of a level.
+    /// Sets targets, prior and spacing of a level.
     fn enter<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
@@ -176,8 +180,8 @@ impl AnnealedSoftassign {
         ws.spacing = ws.patterns.typical_spacing(&levels.target);
     }
 
-    /// The coarsest level, from the centroids. Where any rotation is allowed the best of several
-    /// starts.
+    /// Matches the coarsest level from the centroids. If all rotations are allowed, the best of
+    /// several starts is taken.
     fn coarsest<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
@@ -212,19 +216,20 @@ impl AnnealedSoftassign {
         ControlFlow::Continue(())
     }
 
-    /// How a sample is annealed.
+    /// The annealing schedule of a sample.
     fn sampled<const D: usize>(&self, ws: &SoftassignWorkspace<D>, sigma: f64) -> Schedule {
         Schedule {
-            // A sample is annealed down to so many of its spacings: its points are no partners, and
-            // nearer than that there is nothing to see. Half as much takes twice the time and
-            // leaves noisy sets below their noise (`--example large_sets`).
+            // The final temperature of a sample, in its spacings. The points of samples are not
+            // partners, so a lower temperature resolves nothing. Half as much takes twice the time
+            // and cools noisy sets below their noise (`--example large_sets`).
             floor: 1.0 * ws.spacing,
             ..self.schedule(Cooling { sigma, ..FAST })
         }
     }
 }
 
-/// One annealing run of a level. A single silent iteration where the caller has had enough.
+/// One annealing run of a level. If the caller has stopped the search, a single iteration without
+/// observer.
 fn refine<const D: usize>(
     ws: &mut SoftassignWorkspace<D>,
     schedule: Schedule,
@@ -233,7 +238,7 @@ fn refine<const D: usize>(
 ) -> ControlFlow<()> {
     ws.state.trace.clear();
     ws.state.iterations = 0;
-    // Gaussians fainter than this are left out in large sets: the positions move by a thousandth of
+    // In large sets smaller Gaussians are dropped. This changes the positions by a thousandth of
     // the temperature.
     ws.annealer.soft.faintest = 1e-4;
     if flow.is_continue() {
@@ -244,13 +249,13 @@ fn refine<const D: usize>(
         ..schedule
     };
     let silent = &mut |_, _| ControlFlow::Continue(());
-    // Nobody listens, so nobody breaks off.
+    // The silent observer cannot stop the run.
     let _ = ws.annealer.run(&mut ws.state, &once, silent);
     flow
 }
 
-/// Puts `ws.state` onto the field that the local patterns of about `points` model points agree on.
-/// Candidates lie up to `reach` away.
+/// Moves `ws.state` onto the field that the local patterns of about `points` model points agree on.
+/// Candidates are at most `reach` away.
 fn follow_patterns_of<const D: usize>(
     ws: &mut SoftassignWorkspace<D>,
     levels: &mut Levels<D>,
@@ -277,8 +282,8 @@ fn follow_patterns_of<const D: usize>(
     ws.consensus
         .fit(&mut ws.annealer, SCALES, sets, pairs, coarse);
     std::mem::swap(&mut ws.annealer.prior, &mut levels.sampled);
-    // Patterns are believed where so large a share of them lies within a spacing of one field: of
-    // wrong candidates a sixteenth does.
+    // The patterns are accepted if at least this fraction of them lies within a spacing of one
+    // field. Of wrong candidates a sixteenth does.
     let agreed = agreement(target, pairs, &coarse.warped, ws.spacing) >= 0.3;
     if agreed {
         levels.extend(&mut ws.annealer, 1, step, &mut ws.state);
@@ -286,7 +291,7 @@ fn follow_patterns_of<const D: usize>(
     agreed
 }
 
-/// Share of the pairs whose targets lie within `distance` of where their model points were put.
+/// Fraction of the pairs whose targets lie within `distance` of the model points' positions.
 fn agreement<const D: usize>(
     target: &[[f64; D]],
     pairs: &[(usize, f64)],
@@ -300,19 +305,19 @@ fn agreement<const D: usize>(
     agreeing as f64 / pairs.len().max(1) as f64
 }
 
-// Samples of large sets, and fields that are extended from one to the next.
+// Samples of large sets, and the extension of fields from one sample to the next.
 
-/// Points of a level for one of the next coarser level.
+/// Number of points of a level per point of the next coarser level.
 const STEP: usize = 8;
 
-/// Samples of both sets, and where the coarser level put its points.
+/// Samples of both sets, and the positions found by the coarser level.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Levels<const D: usize> {
     pub(super) model_order: Blocks<D>,
     target_order: Blocks<D>,
     model: Vec<[f64; D]>,
     target: Vec<[f64; D]>,
-    /// Where the start puts all model points.
+    /// Positions of all model points under the start.
     base: Vec<[f64; D]>,
     coarse: State<D>,
     weights: Vec<f64>,
@@ -322,8 +327,8 @@ pub(super) struct Levels<const D: usize> {
 }
 
 impl<const D: usize> Levels<D> {
-    /// The sample of every `stride`-th point. All points in their own order for 1. Also sets the
-    /// sample's base in `state`.
+    /// Takes the sample of every `stride`-th point (all points in their own order for a stride of
+    /// 1). Also sets the base positions of the sample in `state`.
     fn sample(
         &mut self,
         model: &[[f64; D]],
@@ -347,8 +352,8 @@ impl<const D: usize> Levels<D> {
         self.target.extend(rows.map(|&j| target[j]));
     }
 
-    /// The field of `coarse`, every `step`-th point of the level of this stride, at all points of
-    /// that level, in `state.warped`.
+    /// Extends the field of `coarse`, every `step`-th point of the level of this stride, to all
+    /// points of that level. The result is in `state.warped`.
     fn extend(
         &mut self,
         annealer: &mut Annealer<D>,
@@ -373,7 +378,8 @@ impl<const D: usize> Levels<D> {
                 self.wanted.0[d][row] = warped[d] - base[d];
             }
         }
-        // Variance of a coarse field's values when it is extended: what its factor left out.
+        // Variance of the coarse field's values during the extension: the truncation error of its
+        // factor.
         annealer
             .regression
             .fit(&annealer.prior, &self.weights, &self.wanted, 1e-6);

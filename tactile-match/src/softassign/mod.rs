@@ -1,32 +1,32 @@
 //! The default matcher: annealed softassign with a Gaussian-process prior on the warp and
 //! leave-one-out prediction.
 //!
-//! Given where the warp puts the model points, the soft assignment `m_ij ∝ exp(−|yᵢ − tⱼ|²/2σ²)`,
-//! made doubly stochastic with slack, says how likely every pair is. Given the pairs, the warp is
-//! the posterior mean of a smooth random field through the soft partners. The two steps alternate
-//! while the temperature σ falls [Gold, Rangarajan et al., *New algorithms for 2-D and 3-D point
+//! Given the warped model points, the soft assignment `m_ij ∝ exp(−|yᵢ − tⱼ|²/2σ²)`, made doubly
+//! stochastic with slack, is the probability of each pair. Given the pairs, the warp is the
+//! posterior mean of a smooth random field through the soft partners. The two steps alternate while
+//! the temperature σ falls [Gold, Rangarajan et al., *New algorithms for 2-D and 3-D point
 //! matching*, Pattern Recognition 31 (1998); Chui & Rangarajan, *A new point matching algorithm for
 //! non-rigid registration*, CVIU 89 (2003)].
 //!
-//! - Distances are taken from the *leave-one-out* prediction of the warp, so that a wrong match
+//! - Distances are computed from the *leave-one-out* prediction of the warp, so that a wrong match
 //!   does not confirm itself.
-//! - The field's covariance has few modes: a fit costs `O(I r²)` with r near 30, and its leverages
-//!   come with it.
+//! - The covariance of the field has few modes: a fit costs `O(I r²)` with r near 30, leverages
+//!   included.
 //! - Most scenes are easy and end with the first run (`search`). Others get further starts: local
-//!   patterns of dense sets (`patterns`), relaxation labelling (19), (20) over the candidates that
-//!   shape contexts propose (`correspond`), the moments, and the affine map that local tuples of
-//!   points agree on (`tuples`). The start of least energy wins: minus the logarithm of the
-//!   targets' likelihood and of the warp's prior.
+//!   patterns of dense sets (`patterns`), relaxation labelling (19), (20) over the candidates of
+//!   shape contexts (`correspond`), the moments, and the affine map on which local tuples of points
+//!   agree (`tuples`). The start with the lowest energy is chosen: the negative log-likelihood of
+//!   the targets plus that of the warp under its prior.
 //!
-//! Where the residuals are rounding the data are clean, and matched points go exactly onto their
-//! partners. Where they are noise the warp is averaged over the scales of the prior by their
+//! If the residuals are rounding, the data are clean and matched points move exactly onto their
+//! partners. If the residuals are noise, the warp is averaged over the scales of the prior by their
 //! evidence (`scales`), unless the matches themselves are undecided. The final warp is the
 //! thin-plate spline through the estimated positions.
 //!
-//! An iteration costs the pairs within reach of the temperature, at most `O(I J)`, in time and in
-//! memory. Sets of four thousand points and more are matched coarse to fine (`large`), where those
-//! pairs are a few hundred a point. Everything else is computed in double precision, whatever the
-//! type of the points.
+//! An iteration costs time and memory in proportion to the pairs within reach of the temperature,
+//! at most `O(I J)`. Sets of four thousand points and more are matched coarse to fine (`large`),
+//! with a few hundred such pairs per point. Apart from the soft assignment, everything is computed
+//! in double precision, whatever the type of the points.
 
 mod assign;
 mod confidence;
@@ -62,7 +62,7 @@ use scales::ScaleAverage;
 use starts::Tuples;
 use std::ops::ControlFlow;
 
-/// Memory that matches use again and again.
+/// Reusable memory of matches.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -97,7 +97,7 @@ pub struct SoftassignWorkspace<const D: usize> {
     annealer: Annealer<D>,
     state: State<D>,
     best: State<D>,
-    /// The answer from the motions of blocks.
+    /// The result of the block motions.
     followed: State<D>,
     answer: Answer<D>,
     correspondence: Correspondence,
@@ -108,36 +108,36 @@ pub struct SoftassignWorkspace<const D: usize> {
     fine: FineFit<D>,
     levels: Levels<D>,
     motions: Motions<D>,
-    /// From a point of the model to those about it.
+    /// Vectors from a model point to its neighbours.
     steps: Vec<SVector<f64, D>>,
-    /// Typical distance of a target from the next.
+    /// Typical distance of a target to its nearest neighbour.
     spacing: f64,
-    /// Largest motion that is allowed.
+    /// Largest motion allowed.
     farthest: f64,
-    /// Share of points without a partner that the caller expects.
+    /// Fraction of points without a partner expected by the caller.
     expected_share: f64,
     /// Rows of a set, sorted by their coordinates.
     rows: Vec<usize>,
     starts: usize,
     stopped: bool,
-    /// Whether any rotation is allowed and one takes the model onto itself.
+    /// Whether all rotations are allowed and one maps the model onto itself.
     symmetric: bool,
-    /// What explains the targets better than the answer and may not take its place, and by how
-    /// much.
+    /// A rival that fits the targets better than the answer but is excluded by the options, and its
+    /// gain.
     twin: Option<(f64, Doubt)>,
-    /// A step by which the model repeats, where the answer may be off by it.
+    /// A step by which the model repeats, if the answer may be off by it.
     repeats: Option<Doubt>,
-    /// Points that the best run before the last had matched.
+    /// Number of points matched by the best run before the last one.
     matched_before: f64,
-    /// Why the answer is not to be relied on.
+    /// Why the answer is not reliable.
     doubt: Option<Doubt>,
 }
 
 impl<const D: usize> SoftassignWorkspace<D> {
-    /// Decides why the answer is not to be relied on, and lowers its confidences by that.
+    /// Determines the doubt of the answer, and lowers its confidences accordingly.
     fn settle_doubt(&mut self) {
         let smaller = self.model.len().min(self.target.len());
-        // An exact answer explains the targets as well as can be.
+        // An exact answer fits the targets perfectly.
         let gain = self.gain().unwrap_or(f64::INFINITY);
         let share = self.expected_share;
         let doubt = self.answer.doubt(smaller, share, gain, &self.best);
@@ -149,9 +149,9 @@ impl<const D: usize> SoftassignWorkspace<D> {
         }
     }
 
-    /// How much more likely the best answer makes the targets than points strewn over their
-    /// bounding box, warp and all, as a logarithm a point of the smaller set. `None` where an exact
-    /// first run had nothing to be compared with.
+    /// Log-likelihood gain, per point of the smaller set, of the best answer over points
+    /// distributed uniformly in their bounding box. The prior of the warp is included. `None` if an
+    /// exact first run was compared with nothing.
     fn gain(&self) -> Option<f64> {
         let smaller = self.model.len().min(self.target.len()) as f64;
         let strewn = self.target.len() as f64 * self.annealer.volume.ln();
@@ -159,7 +159,7 @@ impl<const D: usize> SoftassignWorkspace<D> {
         energy.is_finite().then(|| (strewn - energy) / smaller)
     }
 
-    /// Takes two sets, in the frame's units.
+    /// Stores two sets, in the units of the frame.
     fn take(
         &mut self,
         model: &[Point<f64, D>],
@@ -181,11 +181,11 @@ impl<const D: usize> SoftassignWorkspace<D> {
 }
 
 impl AnnealedSoftassign {
-    /// As [`match_points`](crate::PointMatcher::match_points) in the caller's workspace. Nothing is
-    /// allocated once that has grown.
+    /// Like [`match_points`](crate::PointMatcher::match_points), in the caller's workspace. It
+    /// allocates nothing once the workspace has grown.
     ///
-    /// `observe` hears the iteration and the energy after every outer iteration and may stop the
-    /// search: the best answer so far is then returned.
+    /// `observe` is called with the iteration and the energy after each outer iteration and may
+    /// stop the search: the best answer so far is then returned.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -218,7 +218,7 @@ impl AnnealedSoftassign {
     /// ```
     ///
     /// # Errors
-    /// As [`match_points`](crate::PointMatcher::match_points).
+    /// Those of [`match_points`](crate::PointMatcher::match_points).
     pub fn match_points_with<'w, const D: usize>(
         &self,
         workspace: &'w mut SoftassignWorkspace<D>,
@@ -232,7 +232,7 @@ impl AnnealedSoftassign {
     }
 }
 
-// The methods of its matcher, which the crate compiles for the plane and for space.
+// The methods of the matcher that this crate compiles for the plane and for space.
 
 impl AnnealedSoftassign {
     pub(crate) fn once<const D: usize>(
@@ -272,17 +272,17 @@ impl AnnealedSoftassign {
     }
 }
 
-/// Beyond this many radii a coordinate is as good as at infinity, and its square is still finite in
-/// single precision.
+/// Coordinates are clamped to this number of radii, which is as good as infinity. The square is
+/// still finite in single precision.
 const FARTHEST: f64 = 1e12;
 
-/// The centroids, and the length that is one inside the matcher.
+/// The centroids and the unit of length inside the matcher.
 #[derive(Clone, Copy, Debug)]
 struct Frame<const D: usize> {
     model: SVector<f64, D>,
     target: SVector<f64, D>,
     scale: f64,
-    /// Radius of the target, over the scale.
+    /// Radius of the target, relative to the scale.
     target_radius: f64,
 }
 
@@ -298,11 +298,11 @@ impl<const D: usize> Default for Frame<D> {
 }
 
 impl<const D: usize> Frame<D> {
-    /// The frame of two sets. The radius of `target` stands in for a model without extent, 1 if
-    /// that has none either.
+    /// The frame of two sets. For a model without extent the radius of `target` is used, or 1 if
+    /// the target has no extent either.
     fn new(model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Self {
         let sets = [model, target].map(bulk);
-        // Below the rounding of the coordinates the radius is noise: such a set is one point.
+        // A radius below the rounding of the coordinates is noise: such a set counts as one point.
         let extended = |(centre, radius): &(SVector<f64, D>, f64)| {
             *radius > 8.0 * f64::EPSILON * centre.amax()
         };
@@ -318,17 +318,17 @@ impl<const D: usize> Frame<D> {
         }
     }
 
-    /// From a model point in the frame to where it lies among the targets.
+    /// Offset from a model point in the frame to its position among the targets without motion.
     fn still(&self) -> [f64; D] {
         self.inward(self.model - self.target)
     }
 
-    /// A model point in the frame.
+    /// Converts a model point into the frame.
     fn model(&self, point: &Point<f64, D>) -> [f64; D] {
         self.inward(point.coords - self.model)
     }
 
-    /// A target point in the frame.
+    /// Converts a target point into the frame.
     fn target(&self, point: &Point<f64, D>) -> [f64; D] {
         self.inward(point.coords - self.target)
     }
@@ -337,7 +337,7 @@ impl<const D: usize> Frame<D> {
         std::array::from_fn(|k| (offset[k] / self.scale).clamp(-FARTHEST, FARTHEST))
     }
 
-    /// A warped point, which lies among the targets, in the units of the caller.
+    /// Converts a warped point, given among the targets, into the units of the caller.
     fn outward(&self, point: &[f64; D]) -> Point<f64, D> {
         Point::from(std::array::from_fn(|k| {
             point[k] * self.scale + self.target[k]
@@ -345,19 +345,19 @@ impl<const D: usize> Frame<D> {
     }
 }
 
-/// Points farther from the centre than so many times the median are not of the bulk of a set: of
-/// points that fill a ball, a box or their rim, none is.
+/// Points farther from the centre than this multiple of the median do not belong to the bulk of a
+/// set. Points that fill a ball, a box or their surfaces have no such outliers.
 const BULK: f64 = 6.0;
 
-/// Centroid and root mean square radius of the bulk of a set: a point at a thousand times the size
-/// of the others decides neither.
+/// Centroid and root mean square radius of the bulk of a set, so that a point at a thousand times
+/// the size of the others does not change them.
 fn bulk<const D: usize>(points: &[Point<f64, D>]) -> (SVector<f64, D>, f64) {
     let (mut centre, mut radius) = centre_and_radius(points);
     let mut kept: Vec<Point<f64, D>> = Vec::new();
-    // Rounds, as what lies farthest hides what lies far.
+    // Several rounds, because the farthest outliers hide nearer ones.
     for _ in 0..4 {
         let within = |p: &&Point<f64, D>, limit: f64| (p.coords - centre).norm() <= limit;
-        // As many lie farther as nearer, but for ties.
+        // Half of the points lie farther than the median.
         let limit = BULK * radius / 4.0;
         let near = points.iter().filter(|p| within(p, limit / BULK)).count();
         if !(radius.is_finite() && 2 * near > points.len()) {
@@ -395,7 +395,7 @@ fn squared_distance<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
     squared(&difference(a, b))
 }
 
-/// The vector with zeros for the dimensions that it lacks.
+/// Extends the vector with zeros to three dimensions.
 fn in_space<const D: usize>(v: &SVector<f64, D>) -> Vector3<f64> {
     Vector3::from_fn(|k, _| if k < D { v[k] } else { 0.0 })
 }

@@ -1,4 +1,5 @@
-//! How the parts of a set move as it lies: peaks of the differences between blocks and targets.
+//! Motions of the parts of a set before any match: peaks of the differences between blocks and
+//! targets.
 
 use super::patterns::Cells;
 use super::{difference, squared_distance};
@@ -6,71 +7,73 @@ use nalgebra::{SMatrix, SVector};
 use std::f64::consts::PI;
 use tactile_core::statistics::quantile;
 
-// Of all differences `tⱼ − xᵢ` between a block of neighbours and the targets those of true pairs
-// crowd about one place, the motion of the block. All others are spread as evenly as the targets.
-// The first blocks look far, every further one about what the motions of its neighbours predict, so
-// that a field that moves points by many spacings is followed from block to block [as image
-// velocimetry does: Scarano, *Iterative image deformation methods in PIV*, Meas. Sci. Technol. 13
-// (2002)]. Of equal peaks, as of a lattice, the one of least motion is taken.
+// Among all differences `tⱼ − xᵢ` between a block of neighbours and the targets, those of correct
+// pairs cluster at one vector, the motion of the block. All others are distributed as evenly as the
+// targets. The first blocks search far; each further block searches near the prediction from its
+// neighbours, so that a field that moves points by many spacings is followed from block to block
+// [as in image velocimetry: Scarano, *Iterative image deformation methods in PIV*, Meas. Sci.
+// Technol. 13 (2002)]. Among equal peaks, such as those of a lattice, the one of least motion is
+// taken.
 
-/// Points of a block, of sets of six blocks and more: so many that a true peak stands out of the
-/// differences to other points by ten of their standard deviations, and so few that a strain of a
-/// tenth does not smear it.
+/// Points per block, for sets of six blocks and more. A true peak then exceeds the differences to
+/// other points by ten of their standard deviations, and a strain of a tenth does not blur it.
 const BLOCK: usize = 320;
 const BLOCKS: usize = 6;
-/// Blocks that hold a point: their motions support a field that bends within a block.
+/// Number of blocks that contain each point: their motions support a field that bends within a
+/// block.
 const OVERLAP: usize = 4;
-/// Fewest points whose common motion is looked for.
+/// Minimum number of points whose common motion is searched.
 const FEWEST: usize = 12;
 /// Sets up to this size are one block.
 const ONE_BLOCK: usize = 500;
-/// Blocks that look far: the chance that all of them lie where a field bends most is small.
+/// Number of blocks that search far: it is unlikely that all of them lie where a field bends most.
 const PROBES: usize = 12;
-/// How far those look, in radii of the model and, for time, in spacings of the plane and of space.
+/// Their search distance, in radii of the model and, to limit the time, in spacings for the plane
+/// and for space.
 const FAR: f64 = 0.35;
 const FAR_SPACINGS: [f64; 2] = [150.0, 20.0];
-/// How far a block looks from what its neighbours predict, in spacings.
+/// Search distance of a block from the prediction of its neighbours, in spacings.
 const NEAR: f64 = 3.0;
-/// Cells of the histogram for a spacing. Three cells, a spacing, are summed.
+/// Histogram cells per spacing. Three cells, one spacing, are summed.
 const CELLS: f64 = 3.0;
-/// Heights of peaks above the next one, in standard deviations of its count: by chance one in three
-/// thousand places exceeds two, and one in a hundred 1.2. Of surfaces, whose differences crowd about
-/// a sheet, peaks are no higher than their neighbours.
+/// Minimum height of a peak above the next one, in standard deviations of its count: by chance one
+/// place in three thousand exceeds 2.0, and one in a hundred 1.2. The differences of surfaces
+/// cluster along a sheet, so their peaks are no higher than the neighbouring ones.
 const FAR_HEIGHT: f64 = 2.0;
 const NEAR_HEIGHT: f64 = 1.2;
-/// Cells within which a peak is one: what it is summed over.
+/// Cells within which peaks count as one: the range of the sum.
 const APART: usize = 3;
-/// Share of the smaller set that a common motion of all points pairs.
+/// Fraction of the smaller set that a common motion of all points must pair.
 const COMMON: f64 = 0.6;
-/// Peaks that reach this share of the highest are as high: of a lattice of 400 points the next one
-/// has 95 %.
+/// Peaks of at least this fraction of the highest count as equal. For a lattice of 400 points the
+/// second peak has 95 %.
 const EQUAL: f64 = 0.97;
-/// Rounds in which the motion of a block follows its pairs. Other targets among them hold it back:
-/// a round leaves half of the error.
+/// Rounds in which the motion of a block is refined with its pairs. Wrong targets among them slow
+/// the convergence: each round halves the error.
 const ROUNDS: usize = 4;
-/// Weight of no gradient beside what the block's points determine, as a share of their spread.
+/// Weight of the prior of zero gradient, as a fraction of the spread of the block's points.
 const RIDGE: f64 = 0.02;
-/// Share of the blocks that agree on a field.
+/// Fraction of the blocks that must agree on a field.
 const AGREEING: f64 = 0.6;
-/// Times that a block without a peak is tried again, with more neighbours.
+/// Number of retries for a block without a peak, with more neighbours each time.
 const TRIES: u8 = 3;
 
-/// Sets lie on each other if four in five points have a target so near, in spacings: by chance one in
-/// eight has.
+/// Two sets coincide if four in five points have a target within this distance, in spacings. By
+/// chance one in eight has.
 const LIES: f64 = 0.2;
-/// Points whose distances from their nearest targets tell how well motions place the sets.
+/// Number of points whose nearest-target distances measure how well motions place the sets.
 const SAMPLE: usize = 2000;
-/// Share of the points that have a target, at least.
+/// Minimum fraction of the points that have a target.
 const PRESENT: f64 = 0.8;
 
-/// The centre of a block, and how it moves.
+/// The centre of a block, with its motion.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seed<const D: usize> {
     /// The model row at the centre.
     pub(super) row: usize,
-    /// The field about it, from where it lies.
+    /// The displacement field about the centre.
     motion: Option<Local<D>>,
-    /// Squared distance from the nearest block that has a motion.
+    /// Squared distance from the nearest block with a known motion.
     distance: f64,
     tries: u8,
 }
@@ -82,24 +85,24 @@ impl<const D: usize> Seed<D> {
     }
 }
 
-/// Memory of the motions.
+/// Working memory of the motions.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Motions<const D: usize> {
     /// Blocks with their motions.
     pub(super) seeds: Vec<Seed<D>>,
     model: Cells<D>,
     targets: Cells<D>,
-    /// Rows of the present block.
+    /// Rows of the current block.
     block: Vec<usize>,
     counts: Vec<u32>,
     sums: Vec<u32>,
     misses: Vec<f64>,
-    /// Points of a block, and the radius of the last one.
+    /// Number of points per block, and the radius of the last block.
     wanted: usize,
     radius: f64,
 }
 
-/// A field about a place: its value there and its gradient.
+/// A linear field about a point: its value there and its gradient.
 #[derive(Clone, Copy, Debug)]
 struct Local<const D: usize> {
     at: SVector<f64, D>,
@@ -127,9 +130,9 @@ impl<const D: usize> Local<D> {
 }
 
 impl<const D: usize> Motions<D> {
-    /// Finds the motions of blocks of `still`, the model as it lies, whose rows `order` sorts so
-    /// that any stride of them is spread well. `spacing` is the mean distance of neighbours,
-    /// `farthest` bounds the motions. False where the blocks do not agree on a field.
+    /// Finds the motions of blocks of `still`, the unmoved model, whose rows `order` sorts so that
+    /// any stride of them is well spread. `spacing` is the mean distance of neighbours, and
+    /// `farthest` bounds the motions. Returns `false` if the blocks do not agree on a field.
     pub(super) fn find(
         &mut self,
         (still, target): (&[[f64; D]], &[[f64; D]]),
@@ -169,7 +172,7 @@ impl<const D: usize> Motions<D> {
         let rows = order.iter().step_by(self.wanted / OVERLAP);
         self.seeds.extend(rows.map(|&row| seed(row)));
         if self.miss(still, target, spacing) <= LIES * spacing {
-            // Of a lattice no peak would stand out.
+            // In a lattice no peak would stand out.
             for seed in &mut self.seeds {
                 seed.motion = Some(Local::still(&still[seed.row]));
             }
@@ -206,8 +209,8 @@ impl<const D: usize> Motions<D> {
         self.seeds.len() as f64 >= AGREEING * total as f64
     }
 
-    /// Distance from their nearest targets that four in five of the moved points do not exceed, up to
-    /// half a spacing: a fifth may be missing.
+    /// Distance to their nearest targets that four in five of the moved points do not exceed, up to
+    /// half a spacing. A fifth of the points may be missing.
     pub(super) fn miss(&mut self, moved: &[[f64; D]], target: &[[f64; D]], spacing: f64) -> f64 {
         let Self {
             misses, targets, ..
@@ -224,17 +227,17 @@ impl<const D: usize> Motions<D> {
         quantile(misses, PRESENT)
     }
 
-    /// Mean of the motions.
+    /// Mean of the motions of the blocks.
     pub(super) fn mean(&self) -> [f64; D] {
         let sum: SVector<f64, D> = self.seeds.iter().filter_map(Seed::value).sum();
         (sum / self.seeds.len().max(1) as f64).into()
     }
 
-    /// The block without a motion that is nearest to one with.
+    /// The block without a motion that is nearest to a block with one.
     fn next(&self) -> Option<usize> {
         let open = self.seeds.iter().enumerate();
         let open = open.filter(|(_, seed)| seed.motion.is_none() && seed.tries < TRIES);
-        // A block that failed waits until others lie as near.
+        // A block that failed waits until the other open blocks are equally near to known motions.
         let place = |seed: &Seed<D>| seed.distance * f64::from(1 + 8 * u32::from(seed.tries));
         open.min_by(|a, b| place(a.1).total_cmp(&place(b.1)))
             .map(|(k, _)| k)
@@ -249,9 +252,9 @@ impl<const D: usize> Motions<D> {
         }
     }
 
-    /// The rows of the block about a model point.
+    /// Collects the rows of the block about a model point.
     fn gather(&mut self, still: &[[f64; D]], row: usize) {
-        // Rounds in which the radius follows the density.
+        // Adapts the radius to the density, round by round.
         for _ in 0..6 {
             self.block.clear();
             let block = &mut self.block;
@@ -267,10 +270,10 @@ impl<const D: usize> Motions<D> {
         }
     }
 
-    /// What the nearest blocks predict at a model point: the mean of their fields.
+    /// Prediction of the nearest blocks at a model point: the mean of their fields.
     fn predict(&self, still: &[[f64; D]], row: usize) -> Local<D> {
         let at = SVector::from(still[row]);
-        // As many as surround it.
+        // Enough blocks to surround the point.
         let mut near = [(f64::INFINITY, None); 4];
         for seed in &self.seeds {
             let square = squared_distance(&still[seed.row], &still[row]);
@@ -293,8 +296,8 @@ impl<const D: usize> Motions<D> {
         }
     }
 
-    /// The motion of the present block at the place of `here`, within `reach` of what that
-    /// predicts, and how its peak stands out. With its gradient, unless the sets are one block.
+    /// The motion of the current block at `here`, within `reach` of the prediction, and how much
+    /// its peak stands out. The gradient is included unless the sets form one block.
     fn peak(
         &mut self,
         still: &[[f64; D]],
@@ -348,8 +351,8 @@ impl<const D: usize> Motions<D> {
         Some((motion, Peak { height, pairs }))
     }
 
-    /// Rounds in which a motion follows the targets within half a spacing of where it puts the
-    /// points of the block. Their number.
+    /// Refines a motion with the targets within half a spacing of the predicted points of the
+    /// block. Returns the number of these targets.
     fn refine(
         &self,
         still: &[[f64; D]],
@@ -390,7 +393,7 @@ impl<const D: usize> Motions<D> {
         count
     }
 
-    /// Sums over three cells an axis, into `sums`.
+    /// Writes sums over three cells per axis into `sums`.
     fn sum_neighbours(&mut self, side: usize) {
         let Self { counts, sums, .. } = self;
         for k in 0..D {
@@ -407,11 +410,11 @@ impl<const D: usize> Motions<D> {
     }
 }
 
-/// How a peak stands out.
+/// How much a peak stands out.
 #[derive(Clone, Copy, Debug)]
 struct Peak {
-    /// Above the next one, in standard deviations.
+    /// Height above the next peak, in standard deviations.
     height: f64,
-    /// Differences within half a spacing of it.
+    /// Number of differences within half a spacing of the peak.
     pairs: f64,
 }

@@ -1,4 +1,4 @@
-//! What a caller knows of a scene: the options of the matcher.
+//! Options of the matcher: the caller's prior knowledge of a scene.
 
 use crate::MatchError;
 use crate::error::{at_least_one, option_within};
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 #[cfg(feature = "rayon")]
 use std::ops::ControlFlow;
 
-/// Points without a partner: their expected share, and how far each side may have them.
+/// Points without a partner: their expected fraction, and a factor for each side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Slack {
     pub share: f64,
@@ -19,10 +19,10 @@ pub(super) struct Slack {
     pub target: f64,
 }
 
-/// Weight of the slack on a side where no outliers are expected.
+/// Weight of the slack on a side without expected outliers.
 const RARE: f64 = 0.01;
 
-/// What the ablation study switches off.
+/// Parts that the ablation study switches off.
 #[doc(hidden)]
 #[allow(missing_docs)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,7 +43,7 @@ pub enum Mechanism {
     Fine,
 }
 
-/// How far the target may be turned against the model.
+/// Limits the rotation between model and target.
 ///
 /// ```
 /// use nalgebra::{Point2, Rotation2};
@@ -52,7 +52,7 @@ pub enum Mechanism {
 ///     .map(f64::from)
 ///     .map(|k| Point2::new(k % 4.0 + 0.3 * k.sin(), (k / 4.0).floor()))
 ///     .collect();
-/// let target: Vec<_> = model.iter().map(|p| Rotation2::new(2.5) * p).collect(); // turned by 143°
+/// let target: Vec<_> = model.iter().map(|p| Rotation2::new(2.5) * p).collect(); // rotated by 143°
 /// let matcher = AnnealedSoftassign::default().with_rotation(Rotation::Any);
 /// let matching = matcher.match_points(&model, &target)?;
 /// assert!((0..12).all(|i| matching.assignment[i] == Some(i)));
@@ -65,14 +65,14 @@ pub enum Mechanism {
     serde(rename_all = "snake_case")
 )]
 pub enum Rotation {
-    /// By up to about half a right angle.
+    /// Up to about 45°.
     #[default]
     Limited,
-    /// By any angle.
+    /// Any angle.
     Any,
 }
 
-/// On which side points without a partner are expected.
+/// The side on which points without a partner are expected.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -101,18 +101,18 @@ pub enum Rotation {
     serde(rename_all = "snake_case")
 )]
 pub enum Outliers {
-    /// Every point may lack its partner.
+    /// Points of both sets may lack a partner.
     #[default]
     Both,
-    /// Only model points: parts of the object are out of sight.
+    /// Only model points may: parts of the object are occluded.
     Model,
-    /// Only target points: clutter.
+    /// Only target points may: there is clutter.
     Target,
-    /// The sets are the same points.
+    /// Both sets hold the same points.
     None,
 }
 
-/// How far the search for the right start goes.
+/// How thoroughly starts are searched.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -137,18 +137,18 @@ pub enum Outliers {
     serde(rename_all = "snake_case")
 )]
 pub enum Search {
-    /// Start after start, until an answer is exact or noise explains its residuals. Noisy answers
-    /// are averaged over the scales of the prior: any scene. Sets of four thousand points and more
-    /// are matched coarse to fine, from one start, whichever search is asked for.
+    /// Tries further starts until an answer is exact or noise explains its residuals. Noisy answers
+    /// are averaged over the scales of the prior. This suits any scene. Sets of four thousand
+    /// points and more are always matched coarse to fine, from one start.
     #[default]
     Thorough,
-    /// One annealing run from the sets as they lie, centred: for sets known to be near each other,
-    /// such as those of one contact at two loads. A fixed, small number of iterations. Noise far
-    /// below the spacing is not told from clean data.
+    /// One annealing run from the centred sets, with a small, fixed number of iterations. This
+    /// suits sets that are known to be near each other, such as those of one contact at two loads.
+    /// Noise far below the spacing is not distinguished from clean data.
     Near,
 }
 
-/// What the model may do on its way to the target.
+/// The class of maps that the model may follow.
 ///
 /// ```
 /// use nalgebra::{Point2, Rotation2};
@@ -158,7 +158,7 @@ pub enum Search {
 ///     .map(|k| Point2::new(k % 4.0 + 0.3 * k.sin(), (k / 4.0).floor()))
 ///     .collect();
 /// let mut target: Vec<_> = model.iter().map(|p| Rotation2::new(0.3) * p).collect();
-/// target[5].x += 0.1; // a point that has moved against the others
+/// target[5].x += 0.1; // a point that has moved relative to the others
 /// let options = AnnealedSoftassign::default().with_transformation(Transformation::Rigid);
 /// let matching = options.match_points(&model, &target)?;
 /// assert!(
@@ -179,23 +179,22 @@ pub enum Search {
     serde(rename_all = "snake_case")
 )]
 pub enum Transformation {
-    /// Bend smoothly.
+    /// A smooth deformation.
     #[default]
     Smooth,
-    /// Follow any affine map: `x ↦ A x + b`.
+    /// An affine map: `x ↦ A x + b`.
     Affine,
-    /// Turn, move and change its size: `x ↦ s R x + b`.
+    /// Rotation, translation and scaling: `x ↦ s R x + b`.
     Similarity,
-    /// Turn and move: `x ↦ R x + b`.
+    /// Rotation and translation: `x ↦ R x + b`.
     Rigid,
 }
 
 /// The default matcher: annealed softassign, with a Gaussian-process prior on the warp and
 /// leave-one-out prediction.
 ///
-/// One default setting serves deformation, noise, outliers and missing points. Say
-/// [`Rotation::Any`] where the target may be turned by more than half a right angle. Two and three
-/// dimensions.
+/// The default settings handle deformation, noise, outliers and missing points, in two and three
+/// dimensions. Use [`Rotation::Any`] if the target may be rotated by more than 45°.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -220,18 +219,18 @@ pub enum Transformation {
 /// ```
 ///
 /// # Options
-/// All of them have defaults that suit every scene tried.
+/// All options have defaults that suit every scene tried.
 ///
 /// ```
 /// use tactile_match::{
 ///     AnnealedSoftassign, MatchError, Outliers, Rotation, Search, Transformation,
 /// };
 /// let options = AnnealedSoftassign::default()
-///     .with_transformation(Transformation::Similarity) // the set only moves, turns and grows
+///     .with_transformation(Transformation::Similarity) // the set only moves, rotates and grows
 ///     .with_rotation(Rotation::Any)
 ///     .with_outliers(Outliers::Model)
 ///     .with_search(Search::Thorough)
-///     .with_outlier_ratio(0.3)? // three in ten points are out of sight
+///     .with_outlier_ratio(0.3)? // three in ten points are occluded
 ///     .with_max_iterations(100)?;
 /// assert_ne!(options, AnnealedSoftassign::default());
 /// assert!(matches!(
@@ -251,7 +250,7 @@ pub struct AnnealedSoftassign {
     pub(super) search: Search,
     pub(super) transformation: Transformation,
     pub(super) share: f64,
-    /// In the units of the points.
+    /// Limit in the units of the points.
     pub(super) largest_motion: f64,
     pub(super) max_iterations: usize,
 }
@@ -272,37 +271,37 @@ impl Default for AnnealedSoftassign {
 }
 
 impl AnnealedSoftassign {
-    /// Says how far the target may be turned.
+    /// Sets the range of rotations of the target.
     #[must_use]
     pub fn with_rotation(mut self, rotation: Rotation) -> Self {
         self.rotation = rotation;
         self
     }
 
-    /// Says where points without a partner are expected.
+    /// Sets the side on which points without a partner are expected.
     #[must_use]
     pub fn with_outliers(mut self, outliers: Outliers) -> Self {
         self.outliers = outliers;
         self
     }
 
-    /// Says how far to search.
+    /// Sets how thoroughly starts are searched.
     #[must_use]
     pub fn with_search(mut self, search: Search) -> Self {
         self.search = search;
         self
     }
 
-    /// Says what the model may do: bend (the default), or only move rigidly, as a similarity or as an affine map.
-    /// Those leave residuals where the pairs do not fit to rounding, and no warped point is put
-    /// onto its partner.
+    /// Sets the class of maps: smooth (the default), rigid, similarity or affine. The latter three
+    /// leave residuals if the pairs do not fit to rounding, and no warped point is moved onto its
+    /// partner.
     #[must_use]
     pub fn with_transformation(mut self, transformation: Transformation) -> Self {
         self.transformation = transformation;
         self
     }
 
-    /// Sets the expected share of points without a partner, in [10⁻⁶, 0.9] (default 0.1).
+    /// Sets the expected fraction of points without a partner, in [10⁻⁶, 0.9] (default 0.1).
     ///
     /// # Errors
     /// [`MatchError::InvalidOption`] outside that range.
@@ -313,13 +312,13 @@ impl AnnealedSoftassign {
     }
 
     /// Sets the largest motion of a point from the model to the target, in the units of the points
-    /// (default: none). It bounds the search: pairs that are farther apart are no pairs, and an
-    /// answer of a lattice that repeats beyond it is no rival.
+    /// (default: unlimited). It bounds the search: points farther apart do not form pairs, and a
+    /// lattice rival beyond this motion raises no doubt.
     ///
     /// ```
     /// use nalgebra::Point2;
     /// use tactile_match::{AnnealedSoftassign, Doubt, PointMatcher};
-    /// // Part of a lattice of spacing 10, moved by 4: or by −6, which shows the same points.
+    /// // Part of a lattice of spacing 10, moved by 4. A motion of −6 would show the same points.
     /// let lattice = |shift: f64| -> Vec<Point2<f64>> {
     ///     (0..144)
     ///         .map(|k| Point2::new(f64::from(k % 12) * 10.0 + shift, f64::from(k / 12) * 10.0))
@@ -343,8 +342,8 @@ impl AnnealedSoftassign {
         Ok(self)
     }
 
-    /// Sets the most outer iterations of one start, at least 1 (default 200). Where the limit ends
-    /// the first start there is no other.
+    /// Sets the maximum number of outer iterations of one start, at least 1 (default 200). If the
+    /// first start reaches the limit, no other start follows.
     ///
     /// # Errors
     /// [`MatchError::InvalidOption`] for 0.
@@ -354,7 +353,7 @@ impl AnnealedSoftassign {
         Ok(self)
     }
 
-    /// Switches one mechanism off, for the ablation study.
+    /// Switches off one mechanism, for the ablation study.
     #[cfg(feature = "ablation")]
     #[doc(hidden)]
     #[must_use]
@@ -388,9 +387,9 @@ type Pair<'a, const D: usize> = (&'a [Point<f64, D>], &'a [Point<f64, D>]);
 
 #[cfg(feature = "rayon")]
 impl AnnealedSoftassign {
-    /// Matches every `(model, target)` on all threads of the current pool, with the bits of
-    /// [`PointMatcher::match_points`](crate::PointMatcher::match_points). A pair that cannot be
-    /// matched does not hinder the others.
+    /// Matches every `(model, target)` on all threads of the current pool. The results equal those
+    /// of [`PointMatcher::match_points`](crate::PointMatcher::match_points) bit by bit. A pair that
+    /// cannot be matched does not affect the others.
     ///
     /// ```
     /// use nalgebra::Point2;

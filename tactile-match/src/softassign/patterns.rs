@@ -1,5 +1,5 @@
-//! Local patterns: which target a point is follows from where its neighbours come to lie. With the
-//! robust fit of doubtful pairs.
+//! Local patterns: the warped neighbours of a point identify its target. Also contains the robust
+//! fit of doubtful pairs.
 
 use super::run::{Annealer, State};
 use super::{difference, squared_distance};
@@ -7,10 +7,10 @@ use crate::gaussian_process::{Axes, Prior, PriorScales};
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::TAU;
 
-/// Memory of the start.
+/// Working memory of the start.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LocalPatterns<const D: usize> {
-    /// Where candidates and where neighbours' targets are looked up.
+    /// Cells for finding candidates and the targets of neighbours.
     pub targets: Cells<D>,
     pub gated: Cells<D>,
     pub model: Cells<D>,
@@ -18,23 +18,23 @@ pub(super) struct LocalPatterns<const D: usize> {
     pub distances: Vec<(f64, usize)>,
     pub candidates: Vec<usize>,
     pub best: Vec<Candidate>,
-    /// The likeliest target of every model point, with the probability that it is right.
+    /// The likeliest target of each model point, with the probability that it is correct.
     pub pairs: Vec<(usize, f64)>,
     pub spacing: f64,
 }
 
-// A start for dense sets: which target a point is, is told by where its neighbours come to lie.
+// A start for dense sets: the warped neighbours of a point identify its target.
 //
-// Once the temperature is below the points' spacing, a part of a dense set that lies one point
-// aside stays there: points are matched one by one, and each has a neighbour's target at hand. The
-// pattern of the neighbours, though, fits at the right target only, the better the less regular the
-// set is. For every model point i and every target j in reach the neighbours are put about `tⱼ` as
-// the warp has them about `yᵢ`, a small affine correction is fitted, and what remains to the
-// targets found there is the candidate's misfit.
+// Once the temperature is below the spacing of the points, a part of a dense set that is shifted by
+// one point stays there: points are matched one by one, and each finds a neighbour's target nearby.
+// The pattern of the neighbours, however, fits only at the correct target, and the more clearly the
+// less regular the set is. For each model point i and each target j in reach, the neighbours are
+// placed about `tⱼ` as the warp has them about `yᵢ`, and a small affine correction is fitted. The
+// remaining distance to the targets there is the misfit of the candidate.
 
-/// Neighbours a point, for every dimension.
+/// Neighbours per point, for each dimension.
 const NEIGHBOURS: usize = 4;
-/// A neighbour's target lies within this many spacings of where it is expected.
+/// Maximum distance of a neighbour's target from its expected position, in spacings.
 const GATE: f64 = 0.45;
 
 /// The target that the pattern of a model point fits best.
@@ -42,14 +42,14 @@ const GATE: f64 = 0.45;
 pub(super) struct Candidate {
     target: usize,
     misfit: f64,
-    /// Misfit at the next best target.
+    /// Misfit at the second-best target.
     second: f64,
 }
 
 impl<const D: usize> LocalPatterns<D> {
-    /// Finds `pairs` for some model rows, in their order, of model points that a first warp has put
-    /// at `warped`, with candidates up to `reach` away. False where the sets have no spacing to
-    /// speak of.
+    /// Finds `pairs` for some model rows, in their order, for model points that a first warp has
+    /// moved to `warped`. Candidates are at most `reach` away. Returns `false` if the sets have no
+    /// meaningful spacing.
     pub(super) fn propose(
         &mut self,
         rows: impl Iterator<Item = usize>,
@@ -61,7 +61,7 @@ impl<const D: usize> LocalPatterns<D> {
         if !(self.spacing > 0.0 && self.spacing < reach) {
             return false;
         }
-        // Side of the cells in which candidates are looked up, in spacings.
+        // Side of the cells for the search of candidates, in spacings.
         self.targets.build(target, 2.0 * self.spacing);
         self.gated.build(target, 2.0 * GATE * self.spacing);
         self.model.build(warped, 2.0 * self.spacing);
@@ -75,9 +75,9 @@ impl<const D: usize> LocalPatterns<D> {
         true
     }
 
-    /// Median distance from a target to the next, over a sample.
+    /// Median nearest-neighbour distance of the targets, over a sample.
     pub(super) fn typical_spacing(&mut self, target: &[[f64; D]]) -> f64 {
-        // Points by which the spacing is told.
+        // Sample of the points that determines the spacing.
         let step = target.len().div_ceil(101);
         self.distances.clear();
         for i in (0..target.len()).step_by(step) {
@@ -94,7 +94,7 @@ impl<const D: usize> LocalPatterns<D> {
             .select_nth_unstable_by(middle, by_distance)
             .1
             .0;
-        // A point alone has no neighbour.
+        // A single point has no neighbour.
         if spacing.is_finite() {
             spacing.sqrt()
         } else {
@@ -102,12 +102,12 @@ impl<const D: usize> LocalPatterns<D> {
         }
     }
 
-    /// The nearest neighbours of model point `i`, as offsets from it.
+    /// Finds the nearest neighbours of model point `i`, as offsets from it.
     fn look_around(&mut self, warped: &[[f64; D]], i: usize) {
         let near = &mut self.distances;
         let wanted = NEIGHBOURS * D;
         let mut radius = 2.0 * self.spacing;
-        // Twice as far until there are enough; a point far from all others makes do with fewer.
+        // Doubles the radius until there are enough neighbours. An isolated point uses fewer.
         for _ in 0..4 {
             near.clear();
             self.model
@@ -128,7 +128,7 @@ impl<const D: usize> LocalPatterns<D> {
         );
     }
 
-    /// The candidate of least misfit for model point `i`.
+    /// The candidate with the smallest misfit for model point `i`.
     fn best_candidate(
         &mut self,
         warped: &[[f64; D]],
@@ -162,13 +162,13 @@ impl<const D: usize> LocalPatterns<D> {
         best
     }
 
-    /// Sum of squared distances between where the neighbours are expected about target `j`, a
-    /// little bent, and the targets there.
+    /// Sum of squared distances between the expected neighbours about target `j`, slightly
+    /// deformed, and the targets there.
     fn misfit(&self, target: &[[f64; D]], j: usize) -> f64 {
-        // Misfits above this share of the largest there can be are not worth a correction.
+        // Misfits above this fraction of the largest possible one are not corrected.
         let hopeless = 0.75 * (GATE * self.spacing).powi(2) * self.offsets.len() as f64;
         let (mut misfit, mut bend) = self.bent(&target[j], target, &SMatrix::zeros());
-        // Rounds of looking up the neighbours' targets and fitting the affine correction.
+        // Alternates finding the neighbours' targets and fitting the affine correction.
         for _ in 0..2 {
             if misfit > hopeless {
                 break;
@@ -178,8 +178,8 @@ impl<const D: usize> LocalPatterns<D> {
         misfit
     }
 
-    /// The misfit about `centre` when the neighbours' offsets are bent by `bend`, and the bend that
-    /// the targets found ask for.
+    /// The misfit about `centre` if the offsets of the neighbours are deformed by `bend`, and the
+    /// deformation that fits the targets found.
     fn bent(
         &self,
         centre: &[f64; D],
@@ -189,7 +189,7 @@ impl<const D: usize> LocalPatterns<D> {
         let gate = GATE * self.spacing;
         let mut misfit = 0.0;
         let mut outer = SMatrix::<f64, D, D>::zeros();
-        // Weight of no correction at all, in squared spacings.
+        // Weight of the prior of no correction, in squared spacings.
         let mut gram = SMatrix::<f64, D, D>::identity() * (0.3 * self.spacing * self.spacing);
         for offset in &self.offsets {
             let offset = SVector::from(*offset);
@@ -209,8 +209,7 @@ impl<const D: usize> LocalPatterns<D> {
         )
     }
 
-    /// Probabilities from misfits, with the noise at which the typical best candidate fits as it
-    /// does.
+    /// Converts misfits into probabilities. The noise level is set by the typical best misfit.
     fn weigh(&mut self) {
         let values = (NEIGHBOURS * D * D) as f64;
         self.distances.clear();
@@ -222,7 +221,7 @@ impl<const D: usize> LocalPatterns<D> {
             .select_nth_unstable_by(place, |a, b| a.0.total_cmp(&b.0))
             .1
             .0;
-        // Misfits are told apart no finer than this, in spacings.
+        // Resolution of misfits, in spacings.
         let variance = (typical / values).max((2e-3 * self.spacing).powi(2));
         self.pairs.clear();
         let pair = |best: &Candidate| {
@@ -231,7 +230,7 @@ impl<const D: usize> LocalPatterns<D> {
             } else {
                 0.0
             };
-            // A misfit three times the typical is no longer one.
+            // A misfit of three times the typical one is rejected.
             let fits = (-0.5 * best.misfit / (9.0 * variance * values)).exp();
             (best.target, trust * fits)
         };
@@ -239,12 +238,12 @@ impl<const D: usize> LocalPatterns<D> {
     }
 }
 
-// Points in hashed square cells: what lies near a place is found without looking at the rest.
+// Points in hashed square cells, so that a search by distance examines only nearby points.
 
-/// Beyond this many cells from the origin all cells are one: coordinates there are as good as
+/// Beyond this number of cells from the origin all cells are one: such coordinates are as good as
 /// infinite.
 const MAX_CELLS: f64 = 1e9;
-/// No point.
+/// Stands for "no point".
 const NONE: u32 = u32::MAX;
 
 /// Square cells that fill space.
@@ -262,17 +261,17 @@ impl Grid {
         }
     }
 
-    /// Index of the cell of a coordinate, along its axis.
+    /// Index of a coordinate's cell along its axis.
     #[inline]
     fn cell(self, coordinate: f64) -> i64 {
         let place = (coordinate * self.per_side).clamp(-MAX_CELLS, MAX_CELLS);
-        // Rounding down by hand: `floor` is a call where the processor's newer instructions are not
-        // compiled for.
+        // Rounds down by hand: `floor` is a function call if the code is not compiled for newer
+        // instructions.
         let towards_zero = place as i64;
         towards_zero - i64::from(towards_zero as f64 > place)
     }
 
-    /// Calls `visit` with every cell that a box of half width `radius` about `place` touches.
+    /// Calls `visit` with each cell that intersects a box of half width `radius` about `place`.
     #[inline]
     fn for_each_cell<const D: usize>(
         self,
@@ -293,7 +292,7 @@ impl Grid {
         }
     }
 
-    /// The chain of a cell, of so many, which are a power of two.
+    /// Index of the chain of a cell. `chains` is a power of two.
     #[inline]
     fn chain<const D: usize>(cell: &[i64; D], chains: usize) -> usize {
         let mixed = cell.iter().fold(0_u64, |hash, &c| {
@@ -305,8 +304,8 @@ impl Grid {
     }
 }
 
-/// Chains of points by the hash of their cell. Cells that share a hash share a chain: distances
-/// tell them apart.
+/// Chains of points by the hash of their cell. Cells with the same hash share a chain, and
+/// distances separate their points.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cells<const D: usize> {
     points: Vec<[f64; D]>,
@@ -316,7 +315,7 @@ pub(super) struct Cells<const D: usize> {
 }
 
 impl<const D: usize> Cells<D> {
-    /// Takes points into cells of this side, which is positive and finite. `O(I)`.
+    /// Stores points in cells of this side, which is positive and finite. `O(I)`.
     pub(super) fn build(&mut self, points: &[[f64; D]], side: f64) {
         self.points.clear();
         self.points.extend_from_slice(points);
@@ -333,8 +332,8 @@ impl<const D: usize> Cells<D> {
         }
     }
 
-    /// Calls `visit` with row and squared distance of every point within `radius` of `place`, in no
-    /// useful order. Twice with the same where two of the cells share a chain.
+    /// Calls `visit` with row and squared distance of each point within `radius` of `place`, in
+    /// unspecified order. A point is visited twice if two of the cells share a chain.
     pub(super) fn within(&self, place: &[f64; D], radius: f64, mut visit: impl FnMut(usize, f64)) {
         self.grid.for_each_cell(place, radius, |cell| {
             let mut row = self.heads[Grid::chain(cell, self.heads.len())];
@@ -360,12 +359,12 @@ impl<const D: usize> Cells<D> {
     }
 }
 
-// A warp from doubtful pairs: a robust fit keeps those that agree.
+// A warp from doubtful pairs: a robust fit keeps the pairs that agree.
 
-/// Rounds of the fit. The first half with a nearly affine warp.
+/// Rounds of the fit. The first half uses a nearly affine warp.
 const FIT_ROUNDS: usize = 12;
 
-/// Memory of the fit.
+/// Working memory of the fit.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Consensus<const D: usize> {
     prior: Prior,
@@ -375,8 +374,8 @@ pub(super) struct Consensus<const D: usize> {
 }
 
 impl<const D: usize> Consensus<D> {
-    /// Robust regression of the likeliest pairs, target and probability for every model point, into
-    /// `state.warped`: those far from the common warp lose their say, round by round.
+    /// Robust regression of the likeliest pairs, a target and probability for each model point. The
+    /// result is in `state.warped`. Pairs far from the common warp lose weight from round to round.
     pub(super) fn fit(
         &mut self,
         annealer: &mut Annealer<D>,
@@ -412,7 +411,7 @@ impl<const D: usize> Consensus<D> {
         }
     }
 
-    /// The displacements that the pairs ask for, and how far each is trusted.
+    /// Stores the displacements of the pairs and their weights.
     fn take(&mut self, target: &[[f64; D]], pairs: &[(usize, f64)], base: &[[f64; D]]) {
         let stride = self.prior.stride;
         let rows = pairs.iter().zip(base);
@@ -425,8 +424,8 @@ impl<const D: usize> Consensus<D> {
         self.weights.resize(stride, 0.0);
     }
 
-    /// New weights from the residuals. The residual variance of those that agree, at most halved a
-    /// round.
+    /// Computes new weights from the residuals. Returns the residual variance of the pairs that
+    /// agree, at least half of the last one.
     fn reweigh(&mut self, displacement: &Axes<D>, last: f64, volume: f64) -> f64 {
         let square = |i: usize| {
             (0..D)

@@ -1,4 +1,4 @@
-//! The result of a match: its warp, and what is kept along a series of targets.
+//! The result of a match: its warp, and the state kept along a series of targets.
 
 use super::assign::Blocks;
 use super::large::LARGE;
@@ -14,12 +14,12 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, OnceLock};
 use tactile_tps::{Smoothing, TpsError, Warp};
 
-/// Soft matches below this are not reported.
+/// Soft matches below this value are not reported.
 const FAINTEST: f64 = 1e-3;
 
-// What a run of the matcher has found, read from its workspace.
+// The result of a run, read from its workspace.
 
-/// The answer in a workspace.
+/// A match in a workspace.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -61,16 +61,16 @@ const FAINTEST: f64 = 1e-3;
 #[derive(Clone, Debug)]
 pub struct SoftassignMatch<'w, const D: usize> {
     workspace: &'w SoftassignWorkspace<D>,
-    /// Target row of every model point.
+    /// Target row of each model point.
     pub assignment: &'w [Option<usize>],
-    /// Probability that each assignment is right.
+    /// Probability that each assignment is correct.
     pub confidence: &'w [f64],
-    /// How it went.
+    /// Report of the match.
     pub report: MatchReport,
 }
 
 impl<'w, const D: usize> SoftassignMatch<'w, D> {
-    /// What the workspace holds.
+    /// The match in the workspace.
     pub(super) fn of(workspace: &'w SoftassignWorkspace<D>) -> Self {
         let scale = workspace.frame.scale;
         Self {
@@ -98,14 +98,14 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
             .map(|w| workspace.frame.outward(w))
     }
 
-    /// The answer with its warp, soft matches and covariances. `model` are the points that were
+    /// The match with its warp, soft matches and covariances. `model` must be the points that were
     /// matched.
     #[must_use]
     pub fn to_matching(&self, model: &[Point<f64, D>]) -> Matching<D> {
         self.interpolated(model, &ModelSpline::new(model))
     }
 
-    /// As [`to_matching`](Self::to_matching), with the factorised system of the model's spline.
+    /// Like [`to_matching`](Self::to_matching), with the factorised system of the model's spline.
     fn interpolated(&self, model: &[Point<f64, D>], spline: &ModelSpline<D>) -> Matching<D> {
         let workspace = self.workspace;
         let (answer, frame) = (&workspace.answer, &workspace.frame);
@@ -138,7 +138,7 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
         }
     }
 
-    /// Soft matches of a model point, by target row.
+    /// Soft matches of a model point, sorted by target row.
     fn soft_row(&self, i: usize) -> Vec<(usize, f64)> {
         let entries = self.workspace.annealer.soft.entries(i);
         let mut row: Vec<_> = entries.filter(|&(_, p)| p > FAINTEST).collect();
@@ -150,7 +150,7 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
 fn stop_reason<const D: usize>(workspace: &SoftassignWorkspace<D>) -> StopReason {
     match () {
         () if workspace.stopped => StopReason::Cancelled,
-        // The floor is reached to rounding.
+        // The lowest temperature is reached, to rounding.
         () if workspace.best.sigma <= 1.000_001 * workspace.annealer.least_sigma
             && !workspace.fine.found
             && workspace.doubt.is_none() =>
@@ -162,18 +162,19 @@ fn stop_reason<const D: usize>(workspace: &SoftassignWorkspace<D>) -> StopReason
     }
 }
 
-// The warp of an answer: the thin-plate spline through the estimated positions.
+// The warp of a match: the thin-plate spline through the estimated positions.
 
-/// Least distance of two points, in radii of the model, from which on a spline surely goes through
-/// all positions: the condition of its system grows with the square of the distance's inverse at
-/// most (Narcowich & Ward, J. Approx. Theory 69, 1992), to 10⁷ for some hundred points.
+/// Minimum distance of two points, in radii of the model, above which a spline is certain to
+/// interpolate all positions: the condition number of its system grows at most with the square of
+/// the inverse distance (Narcowich & Ward, J. Approx. Theory 69, 1992), to 10⁷ for several hundred
+/// points.
 const APART: f64 = 0.01;
 
-/// Radii in which nothing over- or underflows, whatever the type of the points.
+/// Radii for which nothing overflows or underflows, whatever the type of the points.
 const ORDINARY: std::ops::Range<f64> = 1e-12..1e12;
 
-/// A model's interpolating spline: through all points, or through a well-spread sample of a large
-/// set. Its system is factorised when a warp first needs it, and once for all targets.
+/// A model's interpolating spline, through all points or through a well-spread sample of a large
+/// set. Its system is factorised once for all targets, when a warp first needs it.
 #[derive(Clone, Debug)]
 struct ModelSpline<const D: usize> {
     sources: Arc<Sources<D>>,
@@ -182,9 +183,9 @@ struct ModelSpline<const D: usize> {
 #[derive(Debug)]
 struct Sources<const D: usize> {
     points: Vec<Point<f64, D>>,
-    /// Their rows in the model. Empty for all.
+    /// Rows of the sources in the model. Empty if all points are used.
     rows: Vec<usize>,
-    /// Whether a spline goes through any positions.
+    /// Whether a spline can interpolate any positions.
     apart: bool,
     system: OnceLock<Interpolation<D>>,
 }
@@ -204,9 +205,9 @@ impl<const D: usize> ModelSpline<D> {
             let inside: Vec<[f64; D]> = model.iter().map(|p| frame.model(p)).collect();
             let mut blocks = Blocks::default();
             blocks.build(&inside);
-            // Points that the spline of a large set goes through: a system of so many is solved in
-            // a tenth of a second, and between them a field as smooth as the prior's differs from
-            // it by less than its residuals.
+            // Number of points of a large set that the spline interpolates. The system of this size
+            // is solved in a tenth of a second, and between the points the spline differs from a
+            // field as smooth as the prior by less than the residuals.
             let step = model.len() / 1500;
             rows.extend(blocks.order.iter().step_by(step));
         }
@@ -225,8 +226,9 @@ impl<const D: usize> ModelSpline<D> {
         }
     }
 
-    /// The spline that takes the model, or its sample, to `warped`. Where none goes through these
-    /// positions a smoothed one, and `warped`, unless that is of a sample, becomes what it gives.
+    /// The spline that maps the model, or its sample, to `warped`. If no spline interpolates these
+    /// positions, a smoothed one takes its place; `warped` then becomes its values, unless it
+    /// belongs to a sample.
     fn through(&self, warped: &mut [Point<f64, D>]) -> Box<dyn Warp<D> + Send + Sync> {
         let Sources { rows, apart, .. } = &*self.sources;
         let mut images = if rows.is_empty() {
@@ -249,7 +251,7 @@ impl<const D: usize> ModelSpline<D> {
     }
 }
 
-/// A spline that is fitted when it is first asked for: who wants the pairs alone does not wait for
+/// A spline that is fitted on first use, so that callers who need only the pairs do not wait for
 /// it.
 struct Lazy<const D: usize> {
     sources: Arc<Sources<D>>,
@@ -294,8 +296,8 @@ impl<const D: usize> Warp<D> for Lazy<D> {
     }
 }
 
-/// Whether all points are so far from each other, and their set of such a size, that a spline goes
-/// through any positions.
+/// Whether the points are far enough apart, and the size of the set is ordinary enough, for a
+/// spline to interpolate any positions.
 fn are_apart<const D: usize>(points: &[Point<f64, D>]) -> bool {
     let (centre, radius) = centre_and_radius(points);
     if !ORDINARY.contains(&radius) {
@@ -303,7 +305,7 @@ fn are_apart<const D: usize>(points: &[Point<f64, D>]) -> bool {
     }
     let inside = |p: &Point<f64, D>| (p.coords - centre) / radius;
     let mut sorted: Vec<_> = points.iter().map(inside).collect();
-    // Only neighbours along the first axis can be near.
+    // Only neighbours along the first axis can be close.
     sorted.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
     sorted.iter().enumerate().all(|(i, p)| {
         let near = sorted[i + 1..].iter();
@@ -312,46 +314,47 @@ fn are_apart<const D: usize>(points: &[Point<f64, D>]) -> bool {
     })
 }
 
-/// The interpolating spline through the estimated positions. Where there is none (model points that
-/// coincide and go different ways) a smoothed one, and `warped` becomes what that gives.
+/// The interpolating spline through the estimated positions. If there is none (coincident model
+/// points with different displacements), the result is a smoothed spline, and `warped` becomes its
+/// values.
 fn warp_through<const D: usize>(
     sources: &Sources<D>,
     warped: &mut [Point<f64, D>],
 ) -> Box<dyn Warp<D> + Send + Sync> {
     let model = &sources.points;
     let exact = sources.system().through(model, warped);
-    // To half the digits.
+    // Accurate to half the digits.
     if follows(&*exact, model, warped, (0.5 * f64::EPSILON).sqrt()) {
         return exact;
     }
-    // Smoothing of the spline where none goes through all positions.
+    // Smoothing of the spline if none interpolates all positions.
     let (warp, places) = through(model, model, warped, Smoothing::Lambda(1e-6));
     warped.copy_from_slice(&places);
     warp
 }
 
-// What the matcher keeps of one model along a series of targets.
+// State of the matcher for one model along a series of targets.
 
-/// Where the last match put the model, the factorisation of the spline between its points, the
-/// matcher's memory. Given another model it forgets the old one.
+/// The model's last positions, the factorisation of the spline between its points, and the
+/// matcher's memory. A different model resets the state.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Series<const D: usize> {
     model: Vec<Point<f64, D>>,
-    /// Empty where nothing was matched yet.
+    /// Last warped positions. Empty before the first match.
     last: Vec<Point<f64, D>>,
-    /// `last` in the frame of the match that begins there.
+    /// `last` in the frame of the match that starts there.
     start: Vec<[f64; D]>,
-    /// How many points had a partner.
+    /// Number of points with a partner.
     matched: usize,
-    /// The noise that was found, in the units of the points.
+    /// Noise of the last match, in the units of the points.
     sigma: f64,
-    /// Holds the answer of the last match.
+    /// Workspace with the answer of the last match.
     workspace: SoftassignWorkspace<D>,
     spline: Option<ModelSpline<D>>,
 }
 
 impl<const D: usize> Series<D> {
-    /// Forgets the past of another model.
+    /// Resets the state if the model is a different one.
     fn switch_to(&mut self, model: &[Point<f64, D>]) {
         if self.model != model {
             self.model.clear();
@@ -361,7 +364,7 @@ impl<const D: usize> Series<D> {
         }
     }
 
-    /// Keeps the answer in the workspace for the next match.
+    /// Stores the answer in the workspace for the next match.
     fn keep(&mut self) {
         let found = SoftassignMatch::of(&self.workspace);
         self.last.clear();
@@ -370,7 +373,7 @@ impl<const D: usize> Series<D> {
         self.sigma = found.report.sigma;
     }
 
-    /// The last answer, its warp through the factorised system of the model's spline.
+    /// The last answer. Its warp uses the factorised system of the model's spline.
     pub(super) fn matching(&mut self) -> Matching<D> {
         let Self {
             spline,
@@ -393,19 +396,19 @@ impl<const D: usize> Series<D> {
     }
 }
 
-// The next match of a series: from where the last one put the model.
+// The next match of a series starts from the last positions of the model.
 
 impl AnnealedSoftassign {
-    /// A short run from where the last match put the model, as warm as the target is far from
-    /// there. The usual search where there is no last match, or the run loses partners. The answer
-    /// is left in the series.
+    /// A short run from the last positions of the model. Its first temperature is the distance of
+    /// the target from there. If there is no last match, or the run loses partners, the usual
+    /// search follows. The answer stays in the series.
     pub(super) fn follow<const D: usize>(
         &self,
         series: &mut Series<D>,
         model: &[Point<f64, D>],
         target: &[Point<f64, D>],
     ) -> Result<(), MatchError> {
-        // Before the series takes notice of the model.
+        // Validate the sets before the series stores the model.
         error::point_sets(model, target)?;
         series.switch_to(model);
         if !self.go_on(series, model, target)? {
@@ -416,7 +419,7 @@ impl AnnealedSoftassign {
         Ok(())
     }
 
-    /// Whether a run from the last answer is one: it keeps the partners, and fits as well.
+    /// Whether a run from the last answer succeeded: it keeps the partners and fits equally well.
     fn go_on<const D: usize>(
         &self,
         series: &mut Series<D>,
@@ -438,18 +441,19 @@ impl AnnealedSoftassign {
         let frame = workspace.frame;
         start.clear();
         start.extend(last.iter().map(|p| frame.target(p)));
-        // The first temperature is so many times what the sets differ by in place and size.
+        // The first temperature is this multiple of the difference of the sets in position and
+        // size.
         let warmth = 2.0 * apart(start, &workspace.target);
         self.solve_from(workspace, start, warmth);
         let noise = (2.0 * *sigma / frame.scale).max(workspace.annealer.clean_sigma);
         let found = workspace.answer.assignment.iter().flatten().count();
-        // A match that finds partners for less than this share of what the last one found, or
-        // leaves so many times its residuals, is made anew.
+        // A match is made anew if it finds partners for less than this fraction of the last number,
+        // or if its residuals exceed this multiple of the last ones.
         Ok(found as f64 >= 0.95 * *matched as f64 && workspace.best.sigma <= noise)
     }
 }
 
-/// How far two sets are apart in place and size: distance of the centroids and difference of the
+/// Difference of two sets in position and size: distance of the centroids and difference of the
 /// radii.
 fn apart<const D: usize>(a: &[[f64; D]], b: &[[f64; D]]) -> f64 {
     let [(p, r), (q, s)] = [a, b].map(|points| {

@@ -1,18 +1,19 @@
-//! Rigid motions, similarities and affine maps in place of a warp that bends.
+//! Rigid motions, similarities and affine maps in place of a smooth warp.
 
 use super::{FARTHEST, Transformation, in_space};
 use crate::gaussian_process::{Axes, Regression};
 use nalgebra::{Matrix3, Point, SMatrix, SVector, SymmetricEigen, Vector3};
 use tactile_tps::{Affine, Warp};
 
-// Rigid motions and similarities in place of a warp that bends.
+// Rigid motions and similarities in place of a smooth warp.
 //
-// The soft matches pull model point `xᵢ` with weight `wᵢ` to `zᵢ`; the motion of least
-// `Σ wᵢ |s R xᵢ + b − zᵢ|²` is closed-form ([`BestMotion`]). To first order in the noise σ² the image of the point at the offset `r` from the weighted centroid has the covariance
-// `σ² (1/W + [r]× Θ⁻¹ [r]×ᵀ)` with `W = Σ wᵢ` and the tensor of inertia
-// `Θ = Σ wᵢ (|rᵢ|² 1 − rᵢ rᵢᵀ)`, and where the size is free `σ² r rᵀ/Σ wᵢ|rᵢ|²` beside it.
+// The soft matches pull model point `xᵢ` with weight `wᵢ` to `zᵢ`. The motion that minimises `Σ wᵢ
+// |s R xᵢ + b − zᵢ|²` has a closed form ([`BestMotion`]). To first order in the noise σ², the image
+// of the point at the offset `r` from the weighted centroid has the covariance `σ² (1/W + [r]× Θ⁻¹
+// [r]×ᵀ)`, with `W = Σ wᵢ` and the tensor of inertia `Θ = Σ wᵢ (|rᵢ|² 1 − rᵢ
+// rᵢᵀ)`. If the size is free, `σ² r rᵀ/Σ wᵢ|rᵢ|²` is added.
 
-/// The fit, for a model that it keeps.
+/// The fit of one model.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RigidFit<const D: usize> {
     transformation: Transformation,
@@ -21,7 +22,7 @@ pub(super) struct RigidFit<const D: usize> {
 }
 
 impl<const D: usize> RigidFit<D> {
-    /// Takes the model. Idle where the warp may bend.
+    /// Stores the model. Does nothing if the warp may bend.
     pub(super) fn set(&mut self, transformation: Transformation, model: &[[f64; D]]) {
         self.transformation = transformation;
         self.model.clear();
@@ -39,7 +40,7 @@ impl<const D: usize> RigidFit<D> {
         self.transformation != Transformation::Rigid
     }
 
-    /// The displacements from `base` and their variances that the motion of least squares gives,
+    /// Writes the displacements from `base` under the least-squares motion, and their variances,
     /// into `regression`: `O(I)`.
     pub(super) fn fit(
         &mut self,
@@ -60,7 +61,7 @@ impl<const D: usize> RigidFit<D> {
             return self.fit_affine(weights, base, noise, displacements.0[0].len(), regression);
         }
         let scaled = self.transformation == Transformation::Similarity;
-        // Nothing matched, or nothing finite: the model stays where it is.
+        // If nothing is matched, or nothing finite, the model does not move.
         let Some(fit) = BestMotion::of(&self.model, &self.wanted, weights, scaled) else {
             regression.set(displacements.0[0].len(), |_| ([0.0; D], 0.0));
             return;
@@ -87,15 +88,15 @@ impl<const D: usize> RigidFit<D> {
                 0.0
             };
             let variance = noise * (1.0 / total + (turned + grown) / D as f64);
-            let variance = variance.min(FARTHEST); // hardly anything is matched
+            let variance = variance.min(FARTHEST); // hardly any point is matched
             (displacement(&image.into(), &base[i]), variance)
         });
     }
 }
 
 impl<const D: usize> RigidFit<D> {
-    /// The affine map of least squares. An image at the offset `r` from the weighted centroid has
-    /// the variance `σ² (1/W + rᵀ S⁻¹ r)` along each axis, `S = Σ wᵢ rᵢ rᵢᵀ`.
+    /// The least-squares affine map. An image at the offset `r` from the weighted centroid has the
+    /// variance `σ² (1/W + rᵀ S⁻¹ r)` along each axis, with `S = Σ wᵢ rᵢ rᵢᵀ`.
     fn fit_affine(
         &self,
         weights: &[f64],
@@ -130,7 +131,7 @@ impl<const D: usize> RigidFit<D> {
     }
 }
 
-/// The rigid motion or similarity `x ↦ A (x − from) + to` of least weighted squares (Kabsch 1976;
+/// The weighted least-squares rigid motion or similarity `x ↦ A (x − from) + to` (Kabsch 1976;
 /// Umeyama 1991).
 struct BestMotion<const D: usize> {
     linear: SMatrix<f64, D, D>,
@@ -141,7 +142,7 @@ struct BestMotion<const D: usize> {
 }
 
 impl<const D: usize> BestMotion<D> {
-    /// `O(I)`. None without any weight, or of numbers that are not finite.
+    /// Fits in `O(I)`. Returns `None` if all weights are zero or a number is not finite.
     fn of(
         sources: &[Point<f64, D>],
         images: &[Point<f64, D>],
@@ -172,13 +173,15 @@ impl<const D: usize> BestMotion<D> {
     }
 }
 
-/// From where a point lies to its image. Where hardly anything is matched that may be anywhere.
+/// Displacement of a point to its image, limited because the image may be anywhere if hardly any
+/// point is matched.
 fn displacement<const D: usize>(image: &Point<f64, D>, base: &[f64; D]) -> [f64; D] {
     std::array::from_fn(|k| (image[k] - base[k]).clamp(-FARTHEST, FARTHEST))
 }
 
-/// Covariance of the rotation vector at unit noise: the inverse of the inertia, in the plane about
-/// its normal alone. Zero where the points lie on one line, about which no rotation is determined.
+/// Covariance of the rotation vector at unit noise: the inverse of the inertia (in the plane about
+/// its normal only). Zero if the points lie on one line, because the rotation about it is
+/// undetermined.
 fn rotations_covariance<const D: usize>(inertia: &Matrix3<f64>) -> Matrix3<f64> {
     if D == 2 {
         let about = inertia[(2, 2)];
@@ -186,7 +189,7 @@ fn rotations_covariance<const D: usize>(inertia: &Matrix3<f64>) -> Matrix3<f64> 
         return Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, variance));
     }
     let axes = SymmetricEigen::new(*inertia);
-    // Moments below this share of the largest are rounding: of points that lie on one line.
+    // Moments below this fraction of the largest are rounding: the points lie on one line.
     let least = 1e-9 * axes.eigenvalues.max();
     let inverse = |moment: f64| if moment > least { moment.recip() } else { 0.0 };
     let turn = &axes.eigenvectors;

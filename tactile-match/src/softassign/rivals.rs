@@ -1,4 +1,4 @@
-//! Rivals of an answer: the model turned, mirrored or moved by a step of its lattice.
+//! Rivals of an answer: the model rotated, mirrored or shifted by a step of its lattice.
 
 use super::run::{Cooling, State};
 use super::search::{FAST, bounding_volume};
@@ -8,51 +8,54 @@ use crate::Doubt;
 use nalgebra::{SMatrix, SVector};
 use std::ops::ControlFlow;
 
-// A jittered grid that was turned by a quarter has a match near by with every point, which leaves
-// residuals of the jitter. Nothing in that match alone tells it from noise. And a lattice that goes
-// on beyond the view has as many answers as steps. So every map S (a turn, a mirror image, a step)
-// that takes the model nearly onto itself is looked at: point i goes where the answer w has the
-// model point k next to S pᵢ, at `w_k + A (S pᵢ − p_k)` with the affine part A of w. If that lies
-// nearer to the targets than w does, or as near with less motion, the run from there decides by its
-// energy. What explains the targets as well and cannot be told is named.
+// If a jittered grid is rotated by a quarter turn, each point has a nearby partner, with the jitter
+// as residual. Such a match cannot be distinguished from a noisy one by itself. Similarly, a
+// lattice that continues outside the view has as many answers as steps. So each map S (a rotation,
+// a mirror image, a step) that maps the model nearly onto itself is examined: point i moves to the
+// warped position of the model point k nearest to S pᵢ, at `w_k + A (S pᵢ − p_k)` with the affine
+// part A of the warp w. If the result lies nearer to the targets than w does, or equally near with
+// less motion, a run from there decides by its energy. A rival that fits equally well and cannot be
+// excluded becomes a named doubt.
 
-/// Model points that show how far a turned model lies from the targets.
+/// Number of model points that measure the distance of a rotated model from the targets.
 const SAMPLE: usize = 200;
-/// A turned grid has a model point so near to each of its points, in spacings. Of random points
-/// half have.
+/// Maximum distance, in spacings, from the points of a rotated grid to the nearest model points.
+/// Half of all random points meet it.
 const NEAR: f64 = 0.5;
-/// The same for a step of a lattice.
+/// Corresponding distance for a lattice step.
 const NEAR_STEP: f64 = 0.25;
-/// Answers that leave less than this, in spacings, are not looked at: a jitter that small does not
-/// show in the strain.
+/// Answers with residuals below this, in spacings, have no rivals to examine: so small a jitter
+/// does not affect the strain.
 const RESOLVED: f64 = 0.01;
-/// A start is worth a run where it leaves less than this share of the answer's distances.
+/// A start is run if its distances are less than this fraction of those of the answer.
 const NEARER: f64 = 0.9;
-/// The same for a turn or a mirror image that is not allowed: where the model is its own image up
-/// to noise, chance alone often leaves nine tenths.
+/// Corresponding fraction for a rotation or mirror image that is not allowed. If the model is its
+/// own image up to noise, chance alone often gives nine tenths.
 const CLEARLY_NEARER: f64 = 0.75;
-/// What an allowed turn has to gain: odds of e⁵, and of a twentieth of a unit a point.
+/// Minimum gain of an allowed rotation: odds of e⁵, plus a twentieth of a log unit per point.
 const CLEAR_GAIN: [f64; 2] = [5.0, 0.05];
-/// What one that is not allowed has to gain beside e⁵, in square roots of the number of coordinates:
-/// by chance the noise of either answer is less by one of them.
+/// Minimum gain of a rotation that is not allowed, beyond e⁵, in square roots of the number of
+/// coordinates: the noise of either answer varies by one of them.
 const CLEAR_CHANCE: f64 = 4.0;
-/// A step of the lattice explains the targets as well if it leaves so many times the distances.
+/// A lattice step fits the targets equally well if its distances are below this multiple,
 const AS_NEAR: f64 = 1.5;
-/// And so much more, in spacings: less is rounding.
+/// plus this allowance for rounding, in spacings.
 const ROUNDING: f64 = 0.02;
-/// Points nearer than this, in spacings, are no step apart.
+/// Points closer than this, in spacings, are not one step apart.
 const SHORTEST_STEP: f64 = 0.6;
-/// Steps up to so many times the shortest are looked at: the diagonal of a square.
+/// Steps up to this multiple of the shortest are examined, which includes the diagonal of a square.
 const LONGEST_STEP: f64 = 1.6;
-/// A rival with so many times the motion is out of reach: the points moved by less than a sixth of
-/// a step, or by more than five sixths the other way.
+/// A rival whose motion exceeds this multiple is out of reach: the points moved by less than a
+/// sixth of a step, or by more than five sixths the other way.
 const REACH: f64 = 5.0;
-/// Sets of which such a share is matched are the same points, not two views of more.
+/// Two sets hold the same points, rather than two views of more, if at least this fraction is
+/// matched
 const COMPLETE: f64 = 0.995;
-/// Unless both fill the same box, up to this share of a step and so many deviations of the noise.
+/// and their bounding box has changed: by more than this fraction of a step and this number of
+/// standard deviations of the noise.
 const SAME_BOX: [f64; 2] = [0.25, 4.0];
 
-/// As the first run, but no colder than the residuals.
+/// Like the first run, but never below the temperature of the residuals.
 const FOLLOW: Cooling = Cooling {
     least: 1.0,
     patience: 12,
@@ -68,8 +71,8 @@ fn mirror<const D: usize>() -> SMatrix<f64, D, D> {
 }
 
 impl AnnealedSoftassign {
-    /// Looks for a better answer among the turned, mirrored and moved models. Where it is allowed
-    /// it takes the answer's place. What else is better or as good is left in `ws.twin` and
+    /// Searches for a better answer among the rotated, mirrored and shifted models. An allowed one
+    /// replaces the answer. Others that are better or equally good are stored in `ws.twin` and
     /// `ws.repeats`.
     pub(super) fn look_for_rivals<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
         let few = ws.model.len().min(ws.target.len()) < 4 * D;
@@ -86,7 +89,7 @@ impl AnnealedSoftassign {
         }
     }
 
-    /// Looks for a better answer among the turned and mirrored models.
+    /// Searches for a better answer among the rotated and mirrored models.
     fn look_for_turns<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>, spacing: f64) {
         let still = Moved::by_turn(SMatrix::identity());
         let own = ws.distance_after(&still, &ws.linear_part(), spacing, NEAR);
@@ -94,7 +97,7 @@ impl AnnealedSoftassign {
             return;
         };
         for (mirrored, reflection) in [(false, SMatrix::identity()), (true, mirror())] {
-            let linear = ws.linear_part(); // of the answer, which a turned model may have replaced
+            let linear = ws.linear_part(); // of the answer, which a rotated model may have replaced
             let allowed = self.rotation == Rotation::Any && !mirrored;
             let nearer = if allowed { NEARER } else { CLEARLY_NEARER };
             let mut best = (nearer * own, None);
@@ -107,7 +110,7 @@ impl AnnealedSoftassign {
             }
             let Some(moved) = best.1 else { continue };
             ws.start_from(&moved, &linear);
-            // Warmer, points would leave the partners that they begin with.
+            // At a higher temperature points would leave their first partners.
             let gain = self.run_rival(ws, 0.3 * spacing, &moved);
             let points = ws.model.len() as f64;
             let chance = if allowed {
@@ -129,11 +132,11 @@ impl AnnealedSoftassign {
         }
     }
 
-    /// Looks for steps of a lattice: the answer of least motion takes the place of one that
-    /// explains the targets no better. Leaves in `ws.repeats` what is as good and within reach.
+    /// Searches for lattice steps: the answer of least motion replaces one that fits the targets no
+    /// better. Stores in `ws.repeats` a step that fits equally well and is within reach.
     fn look_for_steps<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>, spacing: f64) {
         ws.find_steps(spacing);
-        // Each round takes the answer a step nearer to where the model lies.
+        // Each round shifts the answer by one step towards the unmoved model.
         for _ in 0..4 {
             let linear = ws.linear_part();
             let still = Moved::by_turn(SMatrix::identity());
@@ -159,7 +162,7 @@ impl AnnealedSoftassign {
             if motion < own {
                 ws.start_from(&moved, &linear);
                 let gain = self.run_rival(ws, 0.2 * spacing, &moved);
-                // Edges of a view cost either answer some points.
+                // The edges of a view cost each answer some points.
                 if gain > -CLEAR_GAIN[0] && !ws.state.far {
                     self.accept(ws);
                     continue;
@@ -175,7 +178,7 @@ impl AnnealedSoftassign {
         }
     }
 
-    /// Runs from `ws.state`. What it gains on the answer.
+    /// Runs from `ws.state`. Returns its gain over the answer.
     fn run_rival<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
@@ -188,7 +191,7 @@ impl AnnealedSoftassign {
             ws.state.base.extend(ws.model.iter().map(turned));
             ws.annealer.rigid.set(self.transformation, &ws.state.base);
         }
-        // There is no observer that could stop it.
+        // The silent observer cannot stop the run.
         let silent = &mut |_, _| ControlFlow::Continue(());
         let _ = self.anneal_only(ws, Cooling { sigma, ..FOLLOW }, silent);
         ws.state.tail = ws.annealer.tail(0.1 * ws.spacing);
@@ -209,7 +212,7 @@ impl AnnealedSoftassign {
         gain
     }
 
-    /// The last run becomes the answer.
+    /// Accepts the last run as the answer.
     fn accept<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
         let state = &mut ws.state;
         ws.annealer
@@ -218,7 +221,8 @@ impl AnnealedSoftassign {
     }
 }
 
-/// A map that may take a model onto itself: a turn or a mirror image about the centre, or a step.
+/// A map that may take the model onto itself: a rotation or mirror image about the centre, or a
+/// step.
 struct Moved<const D: usize> {
     turn: SMatrix<f64, D, D>,
     step: SVector<f64, D>,
@@ -243,8 +247,8 @@ impl<const D: usize> Moved<D> {
         self.turn * SVector::from(*p) + self.step
     }
 
-    /// Share of the model that may have no point within reach after it: edges, and more where half
-    /// a spacing is reach.
+    /// Fraction of the model that may have no point within reach after the map: the edges, and more
+    /// if the reach is half a spacing.
     fn misses(&self, reach: f64) -> f64 {
         match () {
             () if self.step.norm_squared() > 0.0 => 0.35,
@@ -260,8 +264,8 @@ impl<const D: usize> SoftassignWorkspace<D> {
         (bounding_volume(&self.model, 1.0) / self.model.len() as f64).powf(1.0 / D as f64)
     }
 
-    /// Whether a turn takes the model onto itself, by what the answer resolves, and lies as near to
-    /// the targets. Then the answer may be turned as well.
+    /// Whether a rotation maps the model onto itself, within the resolution of the answer, and fits
+    /// the targets equally well. The answer may then be off by this rotation.
     pub(super) fn is_symmetric(&mut self) -> bool {
         let spacing = self.mean_spacing();
         let reach = (3.0 * self.best.sigma).min(0.25 * spacing) / spacing;
@@ -275,19 +279,20 @@ impl<const D: usize> SoftassignWorkspace<D> {
             return false;
         };
         starts::rotations::<D>(Rotation::Any).skip(1).any(|turn| {
-            // Medians of so many distances vary by a tenth. Below a hundredth is rounding.
+            // The median of this many distances varies by a tenth; a hundredth of a spacing covers
+            // rounding.
             distance_after(turn).is_some_and(|distance| distance <= 1.3 * own + 0.01 * spacing)
         })
     }
 
-    /// Puts model and targets where they are looked up.
+    /// Builds the look-up cells of model and targets.
     fn put_where_looked_up(&mut self, spacing: f64) {
         self.patterns.model.build(&self.model, spacing);
         self.patterns.targets.build(&self.target, spacing);
     }
 
-    /// Median distance to the targets of the sample after the map. `None` where too many points
-    /// have no model point within reach then.
+    /// Median distance from the sample to the targets after the map. `None` if too many points then
+    /// have no model point within reach.
     fn distance_after(
         &mut self,
         moved: &Moved<D>,
@@ -317,7 +322,7 @@ impl<const D: usize> SoftassignWorkspace<D> {
         Some(*distances.select_nth_unstable_by(middle, f64::total_cmp).1)
     }
 
-    /// Sets `steps` to those from the model point next to the centre to its neighbours.
+    /// Sets `steps` to the offsets from the most central model point to its neighbours.
     fn find_steps(&mut self, spacing: f64) {
         let square = |p: &[f64; D]| squared(p);
         let from = self
@@ -336,7 +341,7 @@ impl<const D: usize> SoftassignWorkspace<D> {
         self.steps.extend(near.map(SVector::from));
     }
 
-    /// Root mean square motion of the model under the answer, moved on by a step.
+    /// Root mean square motion of the model under the answer, shifted by one more step.
     fn motion_after(&self, step: &SVector<f64, D>) -> f64 {
         let still = SVector::from(self.frame.still());
         let rows = self.model.iter().zip(&self.best.warped);
@@ -347,7 +352,7 @@ impl<const D: usize> SoftassignWorkspace<D> {
         (rows.map(motion).sum::<f64>() / self.model.len() as f64).sqrt()
     }
 
-    /// Whether more than a tenth of the points moves farther than is allowed.
+    /// Whether more than a tenth of the points moves farther than allowed.
     pub(super) fn is_far(&self, state: &State<D>) -> bool {
         if self.farthest.is_infinite() {
             return false;
@@ -361,8 +366,8 @@ impl<const D: usize> SoftassignWorkspace<D> {
         10 * far.count() > self.model.len()
     }
 
-    /// Whether the sets are the same points, all in view: nearly all are matched, and the box they
-    /// fill has changed, as that of two views of more points would not.
+    /// Whether both sets hold the same points, all in view: nearly all are matched, and their
+    /// bounding box has changed in a way that it would not for two views of more points.
     fn is_whole(&self, step: &SVector<f64, D>) -> bool {
         let larger = self.model.len().max(self.target.len()) as f64;
         let sides = |points: &[[f64; D]]| -> [f64; D] {
@@ -393,7 +398,7 @@ impl<const D: usize> SoftassignWorkspace<D> {
         cross * gram.try_inverse().unwrap_or_else(SMatrix::zeros)
     }
 
-    /// Puts `state` where the answer has the moved model.
+    /// Moves `state` to the answer for the mapped model.
     fn start_from(&mut self, moved: &Moved<D>, linear: &SMatrix<f64, D, D>) {
         let spacing = self.mean_spacing();
         let (from, to) = (mean(&self.model), mean(&self.best.warped));

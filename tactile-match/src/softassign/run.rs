@@ -1,4 +1,4 @@
-//! One annealing run: soft assignment at a falling temperature, then the warp that it asks for.
+//! One annealing run: soft assignment at a falling temperature, alternating with a fit of the warp.
 
 use super::assign::{Gaussian, SoftAssignment};
 use super::difference;
@@ -10,74 +10,73 @@ use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 use tactile_core::statistics::median;
 
-/// How the temperature of a run falls.
+/// Cooling schedule of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Cooling {
     /// First temperature, as a standard deviation in radii of the model.
     pub sigma: f64,
-    /// Largest fall of σ an iteration, as a factor.
+    /// Largest fall of σ per iteration, as a factor.
     pub rate: f64,
-    /// Smallest fall of σ an iteration, as a factor. With 1 the residuals decide.
+    /// Smallest fall of σ per iteration, as a factor. With 1 the residuals set the temperature.
     pub least: f64,
-    /// Iterations after which a temperature that no longer falls is the last.
+    /// The run ends after this many iterations without a fall of the temperature.
     pub patience: usize,
-    /// The same for the first temperature: a start colder than the noise.
+    /// Corresponding limit for the first temperature, in case the start is colder than the noise.
     pub stuck: usize,
-    /// Sinkhorn sweeps an iteration.
+    /// Sinkhorn sweeps per iteration.
     pub sweeps: usize,
-    /// Undecided matches stand still when residuals and temperature, as variances, differ by less
-    /// than this share.
+    /// The run is stationary if the variances of residuals and temperature differ by less than this
+    /// fraction, although matches are undecided.
     pub still: f64,
-    /// Whether residuals count what the posterior of the warp leaves open. Without it the warp of a
-    /// few points follows their noise, and the temperature falls below it.
+    /// Whether residuals include the posterior variance of the warp. Without it, the warp of a few
+    /// points fits their noise and the temperature falls below it.
     pub open: bool,
 }
 
-/// One annealing run.
+/// Schedule of one annealing run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Schedule {
     pub cooling: Cooling,
     /// Lowest temperature.
     pub floor: f64,
-    /// Most iterations.
+    /// Maximum number of iterations.
     pub limit: usize,
-    /// A cold run that matches fewer points has collapsed and ends.
+    /// A cold run that matches fewer points than this has collapsed and ends.
     pub collapse: f64,
-    /// So many points can have a partner: with nearly all of them matched, residuals that no longer
-    /// fall are noise.
+    /// Number of points that can have a partner. If nearly all of them are matched, residuals that
+    /// no longer fall are noise.
     pub partners: f64,
-    /// What is expected of points without a partner.
+    /// Expectation for points without a partner.
     pub slack: Slack,
 }
 
-/// Where a run stands.
+/// State of a run.
 #[derive(Clone, Debug, Default)]
 pub(super) struct State<const D: usize> {
-    /// Where the run's prior puts the model points.
+    /// Prior positions of the model points.
     pub base: Vec<[f64; D]>,
-    /// Where the warp puts them.
+    /// Warped positions of the model points.
     pub warped: Vec<[f64; D]>,
     /// Standard deviation of the residuals along one axis.
     pub sigma: f64,
-    /// Model points matched, in all.
+    /// Total weight of matched model points.
     pub matched: f64,
-    /// Iterations made.
+    /// Iterations done.
     pub iterations: usize,
-    /// Energy per model point after every iteration.
+    /// Energy per model point after each iteration.
     pub trace: Vec<f64>,
-    /// What the run is judged by. Less is better.
+    /// Energy by which runs are compared. Lower is better.
     pub energy: f64,
     /// Whether the temperature stopped falling before the limit.
     pub settled: bool,
-    /// Whether the residuals are noise, however small.
+    /// Whether the residuals are noise, even if they are small.
     pub noisy: bool,
-    /// Whether many points move farther than is allowed.
+    /// Whether many points move farther than allowed.
     pub far: bool,
-    /// Share of the matched points whose residual the noise of the others does not explain, see
-    /// [`Annealer::tail`].
+    /// Fraction of the matched points whose residual exceeds the noise of the others, see
     pub tail: f64,
-    /// Spread of the soft partners within a row, relative to the temperature: 1 undecided, 0
-    /// decided.
+    /// Spread of the soft partners within a row, relative to the temperature: 1 for undecided, 0
+    /// for decided.
     pub ambiguity: f64,
 }
 
@@ -93,40 +92,40 @@ impl<const D: usize> State<D> {
     }
 }
 
-/// Shared machinery of the runs: targets, prior, scratch.
+/// Shared machinery of the runs: targets, prior and working memory.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Annealer<const D: usize> {
     pub soft: SoftAssignment<D>,
     pub prior: Prior,
     pub regression: Regression<D>,
-    /// Takes the regression's place where the warp may not bend.
+    /// Replaces the regression if the warp must not bend.
     pub rigid: RigidFit<D>,
     /// Volume of the targets' bounding box.
     pub volume: f64,
-    /// Residuals up to this are what the prior's factor leaves out.
+    /// Residuals up to this value are the truncation error of the prior's factor.
     pub clean_sigma: f64,
     /// The lowest temperature.
     pub least_sigma: f64,
-    /// Runs are compared no finer than this.
+    /// Resolution at which runs are compared.
     pub resolution: f64,
     pub weights: Vec<f64>,
     pub residuals: Axes<D>,
     pub predicted: Vec<[f64; D]>,
     pub sums: Vec<f64>,
-    /// Spread of the soft partners within a row, relative to the temperature: 1 undecided, 0
-    /// decided.
+    /// Spread of the soft partners within a row, relative to the temperature: 1 for undecided, 0
+    /// for decided.
     pub ambiguity: f64,
 }
 
-// The alternation: soft assignment at a falling temperature, then the warp that it asks for.
+// The alternation: soft assignment at a falling temperature, then the fit of the warp.
 
-/// Affinities so much fainter than the slack's are left out.
+/// Affinities below this fraction of the slack are dropped.
 const FAINTER: f64 = 1e-3;
-/// Least share of outliers an estimate may come to.
+/// Lower limit of an estimated fraction of outliers.
 const LEAST_SHARE: f64 = 0.02;
 
 impl<const D: usize> Annealer<D> {
-    /// What the soft matches of the last fit ask of the warp.
+    /// The regression problem posed by the soft matches of the last fit.
     pub(super) fn request(&self) -> Request<'_, D> {
         Request {
             weights: &self.weights,
@@ -134,9 +133,10 @@ impl<const D: usize> Annealer<D> {
         }
     }
 
-    /// Soft matches of `warped` at this temperature, with their moments.
+    /// Computes the soft matches of `warped` at this temperature, with their moments.
     ///
-    /// The slack weighs `(2πσ²)^{D/2}` times the density of outliers, beside Gaussian affinities.
+    /// The slack has a weight of `(2πσ²)^{D/2}` times the density of outliers, relative to Gaussian
+    /// affinities.
     /// All weights are raised to the power `sharpness`.
     pub(super) fn assign(
         &mut self,
@@ -165,18 +165,18 @@ impl<const D: usize> Annealer<D> {
         (TAU * variance).powf(0.5 * D as f64) * density
     }
 
-    /// Share of a point's weight that its slack takes where the residual is noise as warm as the
+    /// Fraction of a point's weight that the slack takes if the residual is noise at the current
     /// temperature.
     ///
-    /// A pair with the residual r keeps about `1 − w exp(r²/4σ²)` beside slack of weight w on both
-    /// sides, and the mean of the exponential is `2^{D/2}`.
+    /// A pair with the residual r keeps about `1 − w exp(r²/4σ²)` if the slack has the weight w on
+    /// both sides, and the mean of the exponential is `2^{D/2}`.
     fn lost_to_slack(&self, points: usize, variance: f64, slack: Slack) -> f64 {
         let weight = self.slack_weight(points, 2.0 * variance, slack.share);
         slack.model.max(slack.target) * weight
     }
 
-    /// Alternates until the temperature stands still. `observe` is told every iteration and may
-    /// stop the run.
+    /// Alternates until the temperature no longer falls. `observe` is called after each iteration
+    /// and may stop the run.
     pub(super) fn run(
         &mut self,
         state: &mut State<D>,
@@ -198,17 +198,19 @@ impl<const D: usize> Annealer<D> {
             let floor = self.floor(schedule).powi(2);
             // Temperatures (variances) below this are cold: a tenth of the model's radius.
             if variance < 0.01 && state.matched < schedule.collapse {
-                // The temperature fell below the noise: points lose their partners, and none comes back.
+                // The temperature fell below the noise: points lose their partners and do not
+                // recover them.
                 break;
             }
-            // Soft partners spread less than this, relative to the temperature, are as good as
-            // decided: no need to go slowly.
+            // Soft partners that spread less than this, relative to the temperature, are as good as
+            // decided, so the cooling can be fast.
             let decided = self.ambiguity < 0.01;
             let fall = |rate: f64| variance * rate * rate;
             let rate = if decided { 0.3 } else { schedule.cooling.rate };
             let lowest = fall(rate).max(floor);
-            // With nearly all points matched and decided, and no part aside, residuals above the
-            // temperature are noise. Below it points would lose their partners.
+            // If nearly all points are matched and decided, and no part is displaced, residuals
+            // above the temperature are noise. At lower temperatures points would lose their
+            // partners.
             let lost = self.lost_to_slack(state.warped.len(), variance, schedule.slack);
             noise_found |= schedule.cooling.least < 1.0
                 && residual > variance
@@ -244,8 +246,8 @@ impl<const D: usize> Annealer<D> {
         ControlFlow::Continue(())
     }
 
-    /// One step from `state` in `scratch`: sets soft matches and regression to those of `state`.
-    /// How undecided they are, see [`ambiguity`](Self::ambiguity).
+    /// Makes one step from `state` in working memory: sets soft matches and regression to those of
+    /// `state`. Returns how undecided they are, see [`ambiguity`](Self::ambiguity).
     pub(super) fn restore(
         &mut self,
         state: &State<D>,
@@ -258,8 +260,8 @@ impl<const D: usize> Annealer<D> {
         self.ambiguity
     }
 
-    /// Expectation and maximisation in turn with the noise level free: `rounds` of them, from where
-    /// `state` stands.
+    /// Alternates `rounds` of expectation and maximisation with a free noise level, starting from
+    /// `state`.
     pub(super) fn settle(&mut self, state: &mut State<D>, schedule: &Schedule, rounds: usize) {
         self.predicted.clone_from(&state.warped);
         for _ in 0..rounds {
@@ -269,7 +271,7 @@ impl<const D: usize> Annealer<D> {
         }
     }
 
-    /// Mean variance, along an axis, of where the last fit puts the matched points.
+    /// Mean posterior variance, along an axis, of the matched points in the last fit.
     fn open(&self) -> f64 {
         let weights = &self.soft.moments.weight;
         let variances = weights.iter().zip(&self.regression.variance);
@@ -282,10 +284,10 @@ impl<const D: usize> Annealer<D> {
         schedule.floor.max(self.least_sigma)
     }
 
-    /// One soft assignment and one fit. The residual variance that is left.
+    /// One soft assignment and one fit. Returns the residual variance.
     ///
-    /// Distances are taken from where the *other* points' matches put a point: a wrong match does
-    /// not confirm itself.
+    /// Distances are computed from the prediction by the matches of the *other* points, so that a
+    /// wrong match does not confirm itself.
     fn step(&mut self, state: &mut State<D>, schedule: &Schedule, variance: f64) -> f64 {
         let predicted = std::mem::take(&mut self.predicted);
         self.assign(
@@ -303,7 +305,8 @@ impl<const D: usize> Annealer<D> {
             let w = moments.weight[i];
             let shifts = moments.shift[i].iter().map(|s| s * s);
             within += moments.spread[i] - moments.weight[i] * shifts.sum::<f64>();
-            // A point whose own match decides its position is not left out altogether.
+            // The leverage is limited: a point that determines its own position is not excluded
+            // completely.
             let leverage = (w * self.regression.variance[i] / variance).min(0.95);
             let mut square = moments.spread[i];
             for k in 0..D {
@@ -357,20 +360,20 @@ impl<const D: usize> Annealer<D> {
         self.regression.variances(&self.prior, false);
     }
 
-    /// The annealed energy: distances under M, over the temperature, plus the warp's penalty, a
-    /// model point.
+    /// The annealed energy per model point: distances under M, over the temperature, plus the
+    /// penalty of the warp.
     fn free_energy(&self, state: &State<D>, variance: f64) -> f64 {
         let spread = &self.soft.moments.spread;
         let data = spread.iter().sum::<f64>() / (2.0 * variance);
         (data + 0.5 * self.regression.penalty()) / state.warped.len() as f64
     }
 
-    /// What runs are compared by: `−ln p(targets | warp) − ln p(warp)`, with the warp's posterior
-    /// volume (Laplace).
+    /// Computes the energy by which runs are compared: `−ln p(targets | warp) − ln p(warp)`, with
+    /// the posterior volume of the warp (Laplace).
     ///
     /// The targets are a mixture of Gaussians about the warped points and of uniform outliers,
-    /// whose share is estimated. Residuals under `resolution` count as that, so that an exact fit
-    /// does not win by an infinite margin.
+    /// whose fraction is estimated. Residuals below `resolution` are raised to it, so that an exact
+    /// fit does not win by an infinite margin.
     pub(super) fn evaluate(&mut self, state: &mut State<D>, mut share: f64, resolution: f64) {
         let variance = state.sigma.max(resolution).powi(2);
         let (n, m) = (state.warped.len(), self.soft.targets());
@@ -384,7 +387,7 @@ impl<const D: usize> Annealer<D> {
         self.soft.column_totals(&mut self.sums);
         let sums = &self.sums[..m];
         let density = 1.0 / gaussian;
-        // Fixed-point rounds for the share of outliers.
+        // Fixed-point iterations for the fraction of outliers.
         for _ in 0..8 {
             let outlier = share / self.volume;
             let outliers = sums
@@ -395,8 +398,7 @@ impl<const D: usize> Annealer<D> {
         let (gauss, outlier) = ((1.0 - share) * density, share / self.volume);
         let data: f64 = sums.iter().map(|s| -(gauss * s + outlier).ln()).sum();
         if self.rigid.is_active() {
-            // All motions are equally likely, and as precisely known from one start as from
-            // another.
+            // All motions are equally likely a priori, and equally well determined from any start.
             state.energy = data;
             return;
         }
@@ -415,14 +417,14 @@ impl<const D: usize> Annealer<D> {
     }
 }
 
-// Signs that a part of a set lies one point aside: residuals that the noise of the others does not
-// explain, and soft partners that spread farther than noise makes them.
+// Signs that part of a set is shifted by one point: residuals that exceed the noise of the others,
+// and soft partners that spread farther than the noise.
 
 impl<const D: usize> Annealer<D> {
-    /// Share of the matched points of the last step whose distance from the leave-one-out
-    /// prediction is larger than `least` and than Gaussian noise explains, whose variance the
-    /// median of all squared distances gives. Where a part of a set lies one point aside, its
-    /// points have such residuals, though the root mean square of all is small.
+    /// Fraction of the matched points of the last step whose distance from the leave-one-out
+    /// prediction exceeds `least` and Gaussian noise. The variance of this noise follows from the
+    /// median of all squared distances. If part of a set is shifted by one point, its points have
+    /// such residuals, although the root mean square of all is small.
     pub(super) fn tail(&mut self, least: f64) -> f64 {
         self.sums.clear();
         let moments = &self.soft.moments;
@@ -435,8 +437,8 @@ impl<const D: usize> Annealer<D> {
             return 0.0;
         }
         let median = median(&mut self.sums);
-        // Squared residuals beyond so many variances are not the noise's: one in a thousand
-        // Gaussian ones is, in the plane and in space.
+        // Squared residuals beyond this number of variances are not noise. By chance one Gaussian
+        // residual in a thousand is, in the plane and in space.
         let limit = (16.0 * median / median_of_chi_squared(D)).max(least * least);
         let beyond = self.sums.iter().filter(|&&square| square > limit);
         beyond.count() as f64 / self.sums.len() as f64

@@ -1,31 +1,31 @@
-//! The average over the scales of the prior, by their evidence.
+//! The average over the scales of the prior, weighted by their evidence.
 
 use super::run::State;
 use crate::gaussian_process::{Axes, Prior, PriorScales, Request};
 use crate::kernels::{cholesky, combine, normal_equations, solve};
 use tactile_core::vectorised;
 
-// The scales of the prior, averaged over by their evidence.
+// The average over the scales of the prior, weighted by their evidence.
 //
 // With the soft matches fixed (weights `wᵢ`, targets `zᵢ`, noise σ²) the model is linear,
 // `z = A c + noise`, with `A = [τ Lₛ, τₐ X]`: the factor of the unit Gaussian kernel of length ℓ,
-// and the affine functions. For one ℓ the factor and the Gram matrix `G = [Lₛ X]ᵀ W [Lₛ X]` are
-// computed once; every amplitude τ then costs one Cholesky factorisation of `D G D + σ² 1`, `D` the
-// diagonal of amplitudes. Its evidence is
+// and the affine functions. For each ℓ the factor and the Gram matrix `G = [Lₛ X]ᵀ W [Lₛ X]` are
+// computed once; each amplitude τ then costs one Cholesky factorisation of `D G D + σ² 1`, where
+// `D` is the diagonal of amplitudes. The evidence is
 //
 // `−ln p = (Σ wᵢ|zᵢ|² − cᵀ D b)/2σ² + (d/2) ln det(1 + D G D/σ²)`, `b = [Lₛ X]ᵀ W z`.
 
-/// Lengths ℓ over which the warp may bend, in radii of the model, and amplitudes τ at the first of
-/// them: a factor √2 and 2 apart, about what the evidence of a hundred points tells apart.
+/// Correlation lengths ℓ of the warp, in radii of the model, and amplitudes τ at the first of them.
+/// The ratios are √2 and 2, which the evidence of a hundred points just resolves.
 const LENGTHS: [f64; 4] = [1.2, 1.7, 2.4, 3.4];
 const AMPLITUDES: [f64; 5] = [0.35, 0.2, 0.1, 0.05, 0.025];
 
-/// Memory of the average.
+/// Working memory of the average.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ScaleAverage<const D: usize> {
-    /// The smooth part of every length.
+    /// The smooth part of the prior for each length.
     smooth: [Prior; LENGTHS.len()],
-    /// The energy of every scale in the last average.
+    /// The energy of each scale in the last average.
     energies: Vec<f64>,
     /// The affine functions 1, x, y, …, column by column.
     affine: Vec<f64>,
@@ -35,8 +35,8 @@ pub(super) struct ScaleAverage<const D: usize> {
     solution: Vec<[f64; D]>,
     weighted: Vec<f64>,
     displacement: Axes<D>,
-    /// Sums over all scales by their evidence, relative to the least energy: of the displacements,
-    /// of their squares, of the weights.
+    /// Sums over all scales, weighted by evidence relative to the lowest energy: of the
+    /// displacements, of their squares and of the weights.
     mean: Axes<D>,
     square: Vec<f64>,
     total: f64,
@@ -46,9 +46,9 @@ pub(super) struct ScaleAverage<const D: usize> {
 }
 
 impl<const D: usize> ScaleAverage<D> {
-    /// Replaces `state.warped` by the mean over all scales of the warps that the soft matches ask
-    /// for, each weighted by its evidence. Returns the scales of most evidence. `O(I r²)` for every
-    /// length. Where `likely`, only scales that had some evidence in the last average.
+    /// Replaces `state.warped` by the mean over all scales of the warps fitted to the soft matches,
+    /// each weighted by its evidence. Returns the scales of highest evidence. `O(I r²)` for each
+    /// length. If `likely`, only scales with some evidence in the last average are used.
     pub(super) fn average(
         &mut self,
         request: Request<'_, D>,
@@ -62,8 +62,8 @@ impl<const D: usize> ScaleAverage<D> {
             self.energies.clear();
             self.energies.resize(LENGTHS.len() * AMPLITUDES.len(), 0.0);
         }
-        // Scales whose evidence is so many units of the logarithm below the best do not count:
-        // together less than a hundredth.
+        // Scales whose log-evidence is this far below the best are skipped: together they weigh
+        // less than a hundredth.
         let limit = self.energies.iter().copied().fold(f64::INFINITY, f64::min) + 8.0;
         let mut best = PriorScales::default();
         self.clear(model.len());
@@ -89,7 +89,7 @@ impl<const D: usize> ScaleAverage<D> {
                     };
                 }
                 let weight = self.weigh(energy);
-                // Below this the mean does not change by a thousandth of the noise.
+                // Smaller weights change the mean by less than a thousandth of the noise.
                 if weight > 1e-4 {
                     self.add(l, bending, affine, weight);
                 }
@@ -99,7 +99,7 @@ impl<const D: usize> ScaleAverage<D> {
         best
     }
 
-    /// Forgets all sums.
+    /// Resets all sums.
     fn clear(&mut self, points: usize) {
         (self.total, self.least) = (0.0, f64::INFINITY);
         for axis in self.mean.0.iter_mut().chain([&mut self.square]) {
@@ -108,7 +108,7 @@ impl<const D: usize> ScaleAverage<D> {
         }
     }
 
-    /// The weight of a scale by its energy. What was summed so far is made relative to the least.
+    /// The weight of a scale by its energy. Earlier sums are rescaled to the lowest energy.
     fn weigh(&mut self, energy: f64) -> f64 {
         if energy < self.least {
             let fade = if self.least.is_finite() {
@@ -127,7 +127,7 @@ impl<const D: usize> ScaleAverage<D> {
         weight
     }
 
-    /// Puts the points at the mean of what was summed, and sets `spread`.
+    /// Moves the points to the accumulated mean, and sets `spread`.
     fn place(&mut self, state: &mut State<D>) {
         self.spread.clear();
         for (i, warped) in state.warped.iter_mut().enumerate() {
@@ -141,7 +141,7 @@ impl<const D: usize> ScaleAverage<D> {
         }
     }
 
-    /// Factor and Gram matrix of one length.
+    /// Computes factor and Gram matrix of one length.
     fn prepare(&mut self, request: Request<'_, D>, model: &[[f64; D]], l: usize, noise: f64) {
         let length = LENGTHS[l];
         let unit = PriorScales {
@@ -158,7 +158,7 @@ impl<const D: usize> ScaleAverage<D> {
             self.affine.extend(model.iter().map(|p| p[k]));
             self.affine.resize((k + 2) * stride, 0.0);
         }
-        // Modes that the noise hides at the largest amplitude are hidden at all.
+        // Modes hidden by the noise at the largest amplitude are hidden at all amplitudes.
         let largest = AMPLITUDES[0] * length / LENGTHS[0];
         let count = self.smooth[l].rank_beside(noise / (largest * largest)) + D + 1;
         self.gram.resize(count * count, 0.0);
@@ -188,7 +188,7 @@ impl<const D: usize> ScaleAverage<D> {
         );
     }
 
-    /// The energy of one amplitude. Leaves the coefficients in `solution`.
+    /// The energy of one amplitude. The coefficients are stored in `solution`.
     fn fit(&mut self, request: Request<'_, D>, bending: f64, affine: f64, noise: f64) -> f64 {
         let count = self.moments.len();
         let smooth = count - D - 1;
@@ -239,7 +239,7 @@ impl<const D: usize> ScaleAverage<D> {
         0.5 * ((squares - explained) / noise + D as f64 * log_det)
     }
 
-    /// Adds the displacements of the present coefficients to the mean.
+    /// Adds the displacements of the current coefficients to the mean.
     fn add(&mut self, l: usize, bending: f64, affine: f64, weight: f64) {
         let stride = self.smooth[l].stride;
         let smooth = self.moments.len() - D - 1;
@@ -272,7 +272,7 @@ impl<const D: usize> ScaleAverage<D> {
     }
 }
 
-/// Column `p` of `[Lₛ X]`, `smooth` of which are the prior's.
+/// Column `p` of `[Lₛ X]`. The first `smooth` columns are those of the prior.
 fn column_of<'a>(prior: &'a Prior, affine: &'a [f64], smooth: usize, p: usize) -> &'a [f64] {
     if p < smooth {
         prior.column(p)

@@ -1,10 +1,10 @@
-//! The search: a list of starts, each annealed on its own schedule and compared by its evidence,
-//! until an answer leaves no doubt.
+//! The search: a list of starts, each annealed on its own schedule and compared by evidence, until
+//! an answer leaves no doubt.
 //!
-//! Most scenes are easy and end with the first, fast run. Where its answer neither fits exactly nor
-//! leaves residuals that noise explains, the further starts follow, from the cheapest to the most
-//! expensive. The answer of least energy wins. Noisy scenes then average over the scales of the
-//! prior.
+//! Most scenes are easy and end with the first, fast run. If its answer does not fit exactly and
+//! noise does not explain its residuals, further starts follow, from the cheapest to the most
+//! expensive. The answer with the lowest energy is chosen. For noisy scenes the scales of the prior
+//! are then averaged.
 
 use super::confidence::{self, MIN_TELLING_GAIN};
 use super::run::{Cooling, Schedule};
@@ -22,14 +22,15 @@ pub(super) const SCALES: PriorScales = PriorScales {
     bending: 0.35,
     affine: 0.5,
 };
-/// A set of so many points is dense: an exact answer need not be complete, and local tuples are
+/// A set of this many points is dense: an exact answer need not be complete, and local tuples are
 /// tried first.
 const MIN_DENSE_POINTS: usize = 500;
 
-/// Farthest target that the pattern of a point is compared at, in radii of the model.
+/// Largest distance of targets with which the pattern of a point is compared, in radii of the
+/// model.
 pub(super) const MAX_PATTERN_REACH: f64 = 0.25;
 
-/// The first run. Its temperature falls whatever the residuals are.
+/// Cooling of the first run. Its temperature falls independently of the residuals.
 pub(super) const FAST: Cooling = Cooling {
     sigma: 0.3,
     rate: 0.75,
@@ -40,62 +41,64 @@ pub(super) const FAST: Cooling = Cooling {
     still: 1e-4,
     open: false,
 };
-/// Further runs follow the residuals. They end when the temperature has stood still for `patience`
-/// iterations: matches that have not settled by then wander for hundreds.
+/// Cooling of further runs, which follow the residuals. They end when the temperature has not
+/// fallen for `patience` iterations: matches that are still unsettled can drift for hundreds of
+/// iterations.
 const SLOW: Cooling = Cooling {
     rate: 0.93,
     least: 1.0,
     patience: 20,
     stuck: 8,
     sweeps: 5,
-    // A tenth moves no mean of the ablation and takes a fifth more time under noise.
+    // A tenth of this changes no mean of the ablation study and takes a fifth more time under
+    // noise.
     still: 1e-3,
     ..FAST
 };
-/// Where a few points have lost their partners below the noise.
+/// Cooling if a few points have lost their partners below the noise.
 const OPEN: Cooling = Cooling {
     rate: FAST.rate,
     open: true,
     ..SLOW
 };
-/// From the best answer so far.
+/// Cooling from the best answer so far.
 const REHEAT: Cooling = Cooling {
     sigma: 0.1,
     rate: 0.9,
     ..SLOW
 };
-/// From the motions of blocks: as warm as those leave points aside, in mean spacings.
+/// Cooling from the motions of blocks. The temperature is their error, in mean spacings.
 const MOVED: Cooling = Cooling {
     sigma: 0.4,
     rate: FAST.rate,
     sweeps: FAST.sweeps,
     ..SLOW
 };
-/// So warm is a start from the motions, in distances that four in five points do not exceed: others
-/// are twice as far.
+/// First temperature of a start from the motions, relative to the distance that four in five points
+/// do not exceed: the remaining points are twice as far.
 const MISSES: f64 = 2.0;
-/// The coldest such start, in mean spacings: a field that bends between the blocks.
+/// Lowest such temperature, in mean spacings: it allows for bending between the blocks.
 const COLDEST: f64 = 0.1;
-/// Share of the points in view that an answer from the motions of blocks matches: more may be
-/// missing on either side.
+/// Minimum fraction of the points in view that an answer from the block motions matches: more may
+/// be missing on either side.
 const FOLLOWED: f64 = 0.75;
-/// A larger share of residuals that noise does not explain is of a part that lies aside: it explains
-/// one in a thousand, and trades of random points a few.
+/// A larger fraction of unexplained residuals comes from a displaced part: noise explains one
+/// residual in a thousand, and swaps of random points a few.
 const LEAST_ASIDE: f64 = 0.02;
-/// Soft partners that spread more than this, relative to the temperature, hide the evidence of a warp
-/// behind that of its matches.
+/// If soft partners spread more than this, relative to the temperature, the evidence of a warp is
+/// hidden by that of its matches.
 const MOST_SPREAD: f64 = 0.3;
-/// Residuals of an answer in space from the motions of blocks, in spacings, up to which it needs no
-/// other.
+/// If an answer in space from the motions of blocks has residuals below this, in spacings, no
+/// further start is needed.
 const SLIPPED: f64 = 0.15;
 /// Error of a block's motion, in spacings.
 const MOTION_ERROR: f64 = 0.15;
-/// After relaxation labelling, whose pairs are trusted more than a first guess.
+/// Cooling after relaxation labelling, whose pairs are more reliable than a first guess.
 const LABELLED: Cooling = Cooling {
     sigma: 0.15,
     ..SLOW
 };
-/// The only run between sets that lie near each other.
+/// Cooling of the only run between sets that are near each other.
 const NEAR: Cooling = Cooling {
     sigma: 0.2,
     rate: 0.8,
@@ -105,8 +108,8 @@ const NEAR: Cooling = Cooling {
     ..FAST
 };
 
-/// From the patterns or tuples of points. Warmer, the edges of a cropped set would draw it together
-/// again.
+/// Cooling from the patterns or tuples of points. A higher temperature would contract a cropped set
+/// at its edges.
 fn seeded(spacing: f64) -> Cooling {
     Cooling {
         sigma: 0.3 * spacing,
@@ -114,10 +117,10 @@ fn seeded(spacing: f64) -> Cooling {
     }
 }
 
-/// Where a run starts.
+/// Start of a run.
 #[derive(Clone, Copy, Debug)]
 enum Start<const D: usize> {
-    /// The centroids on each other.
+    /// The centroids are aligned.
     Centred,
     /// The best answer so far.
     Best,
@@ -125,11 +128,11 @@ enum Start<const D: usize> {
     Patterns,
     /// The pairs of relaxation labelling.
     Labelling,
-    /// The sets as they lie, corrected by the motions of blocks.
+    /// The unmoved sets, corrected by the motions of blocks.
     Moved,
-    /// The second moments on each other, after a rotation.
+    /// The second moments are aligned, after a rotation.
     Moments(SMatrix<f64, D, D>),
-    /// The affine map that local tuples of points agree on.
+    /// The affine map on which local tuples of points agree.
     Tuples,
 }
 
@@ -155,8 +158,8 @@ impl AnnealedSoftassign {
         self.conclude(ws);
     }
 
-    /// One short run from `start`, at first as warm as `sigma`, between the coldest that lets
-    /// points change their partners and that of sets near each other.
+    /// One short run from `start`. Its first temperature is `sigma`, limited to the range between
+    /// the lowest at which points still change partners and that of sets near each other.
     pub(super) fn solve_from<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
@@ -172,12 +175,12 @@ impl AnnealedSoftassign {
             sigma: sigma.clamp(0.03, NEAR.sigma),
             ..NEAR
         };
-        // There is no observer that could stop it.
+        // The silent observer cannot stop the run.
         let _ = self.anneal(ws, cooling, &mut |_, _| ControlFlow::Continue(()));
         self.conclude(ws);
     }
 
-    /// Nothing is found yet.
+    /// Resets the results.
     fn begin<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
         ws.annealer.soft.faintest = 1e-6;
         ws.annealer.volume = bounding_volume(&ws.target, ws.frame.target_radius);
@@ -196,7 +199,7 @@ impl AnnealedSoftassign {
         ws.best.energy = f64::INFINITY;
     }
 
-    /// Sets up prior and targets for all points.
+    /// Prepares prior and targets for all points.
     fn prepare<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
         ws.annealer.prior.build(&ws.model, SCALES);
         ws.annealer.soft.set_targets(&ws.target);
@@ -208,8 +211,7 @@ impl AnnealedSoftassign {
         ws.expected_share = self.share;
         let noisy = ws.best.noisy || self.resolve(ws);
         if ws.starts > 1 || noisy || !self.is_exact(ws) {
-            // Soft matches and regression are those of the last run, which need not be the best
-            // one.
+            // Soft matches and regression are those of the last run, which may not be the best run.
             let schedule = self.schedule(Cooling {
                 sigma: ws.best.sigma,
                 ..SLOW
@@ -239,7 +241,8 @@ impl AnnealedSoftassign {
         ws.settle_doubt();
     }
 
-    /// All starts in turn until the best answer leaves no doubt, then the scales of the prior.
+    /// Tries the starts in turn until the best answer leaves no doubt, then averages over the
+    /// scales of the prior.
     fn search<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
@@ -251,7 +254,7 @@ impl AnnealedSoftassign {
             self.run(ws, Start::Moved, MOVED, observe)?;
         }
         if ws.starts == 0 || !self.is_followed(ws, observe)? {
-            // The other starts would go on from it if it is wrong.
+            // Further starts would continue from this answer even if it is wrong.
             std::mem::swap(&mut ws.followed, &mut ws.best);
             (ws.best.energy, ws.best.matched) = (f64::INFINITY, 0.0);
             let runs = std::mem::take(&mut ws.starts);
@@ -270,8 +273,9 @@ impl AnnealedSoftassign {
         ControlFlow::Continue(())
     }
 
-    /// Whether a run from the motions of blocks is the answer: it is exact, or of a dense set,
-    /// likely, and the local patterns of the points do not lead to a better one.
+    /// Whether a run from the motions of blocks is the answer. It is if it is exact, or if the set
+    /// is dense, the answer is likely, and the local patterns of the points do not lead to a better
+    /// one.
     fn is_followed<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
@@ -283,12 +287,12 @@ impl AnnealedSoftassign {
         let energy = ws.best.energy;
         let seeded = seeded(ws.spacing);
         self.run(ws, Start::Patterns, seeded, observe)?;
-        // Trades of a few near points change it by less than this for every point.
+        // Swaps of a few close points change the energy by less than this per point.
         let least = energy - 0.01 * ws.model.len() as f64;
         ControlFlow::Continue(ws.best.energy >= least && ws.is_likely())
     }
 
-    /// The starts that do not take the sets as they lie, until an answer leaves no doubt.
+    /// Tries the starts that do not use the unmoved sets, until an answer leaves no doubt.
     fn try_starts<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
@@ -296,14 +300,14 @@ impl AnnealedSoftassign {
     ) -> ControlFlow<()> {
         self.run(ws, Start::Centred, FAST, observe)?;
         if !ws.best.settled && ws.best.iterations >= self.max_iterations {
-            return ControlFlow::Continue(()); // the limit would cut every further start as well
+            return ControlFlow::Continue(()); // the limit would stop every further start as well
         }
         let dense = ws.model.len().min(ws.target.len()) >= MIN_DENSE_POINTS;
         let limited = self.rotation == Rotation::Limited;
         let seeded = seeded(ws.spacing);
         let patterns =
             (dense && self.has(Mechanism::Patterns)).then_some((Start::Patterns, seeded));
-        // Each time they start from a better field, as long as more points are matched.
+        // Repeats from the improved field as long as more points are matched.
         let patterns = [patterns; 6].into_iter();
         let first = [
             (!dense && self.has(Mechanism::Motions)).then_some((Start::Moved, MOVED)),
@@ -340,7 +344,7 @@ impl AnnealedSoftassign {
         ControlFlow::Continue(())
     }
 
-    /// A run from a start. None where the sets do not have such a start.
+    /// Runs from a start. Returns `None` if the sets have no such start.
     fn run<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
@@ -358,8 +362,8 @@ impl AnnealedSoftassign {
         self.anneal(ws, Cooling { sigma, ..cooling }, observe)
     }
 
-    /// Puts `ws.state` to a start: base and warped positions. False where the sets do not have such
-    /// a start.
+    /// Sets `ws.state` to a start: base and warped positions. Returns `false` if the sets have no
+    /// such start.
     fn place<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>, start: Start<D>) -> bool {
         let (model, target) = (&*ws.model, &*ws.target);
         let state = &mut ws.state;
@@ -404,7 +408,8 @@ impl AnnealedSoftassign {
                 }
             }
             Start::Labelling => {
-                // Where noise hides which point is which, the points' surroundings hold nothing.
+                // If noise hides the correspondence, the surroundings of the points hold no
+                // information.
                 let hidden = ws.best.ambiguity >= 0.8 && ws.best.sigma >= 0.999 * REHEAT.sigma;
                 if hidden && !ws.annealer.rigid.is_active() {
                     return false;
@@ -421,8 +426,8 @@ impl AnnealedSoftassign {
         true
     }
 
-    /// Puts `ws.state` where the motions of the blocks take the model from where it lies. False
-    /// where they do not agree on a field.
+    /// Moves `ws.state` by the motions of the blocks. Returns `false` if they do not agree on a
+    /// field.
     pub(super) fn place_by_motions<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) -> bool {
         let still = ws.frame.still();
         let state = &mut ws.state;
@@ -473,7 +478,7 @@ impl AnnealedSoftassign {
         true
     }
 
-    /// Anneals `ws.state` from its place. Kept if it is the best so far.
+    /// Anneals `ws.state` from its current positions, and keeps it if it is the best so far.
     fn anneal<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
@@ -487,7 +492,7 @@ impl AnnealedSoftassign {
         if ws.starts == 1 {
             ws.best.copy_from(&ws.state);
             if self.is_exact(ws) {
-                return flow; // there will be nothing to compare it with
+                return flow; // no other run follows to compare it with
             }
         }
         ws.state.tail = ws.annealer.tail(0.1 * ws.spacing);
@@ -502,7 +507,7 @@ impl AnnealedSoftassign {
         flow
     }
 
-    /// Anneals `ws.state` from its place.
+    /// Anneals `ws.state` from its current positions.
     pub(super) fn anneal_only<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
@@ -521,8 +526,8 @@ impl AnnealedSoftassign {
         ws.annealer.run(&mut ws.state, &schedule, observe)
     }
 
-    /// The mean over the prior's scales, by their evidence, twice: the first changes matches and
-    /// noise level, from which the second starts.
+    /// Averages over the scales of the prior by their evidence, twice: the first average changes
+    /// matches and noise level, from which the second starts.
     fn average_scales<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
         let schedule = self.schedule(Cooling {
             sigma: ws.best.sigma,
@@ -542,7 +547,7 @@ impl AnnealedSoftassign {
         let likeliest = average(ws, false);
         ws.annealer.prior.build(&ws.model, likeliest);
         ws.state.copy_from(&ws.best);
-        // A third round moves the warp by a hundredth of the noise.
+        // A third round moves the warp by only a hundredth of the noise.
         ws.annealer.settle(&mut ws.state, &schedule, 2);
         ws.best.sigma = ws.state.sigma;
         average(ws, true);
@@ -550,7 +555,7 @@ impl AnnealedSoftassign {
 
     pub(super) fn schedule(&self, mut cooling: Cooling) -> Schedule {
         if self.transformation != Transformation::Smooth {
-            // A motion without bending stands still while it turns into place.
+            // A motion without bending can stall while it rotates into place.
             cooling.stuck = cooling.patience;
         }
         Schedule {
@@ -563,9 +568,9 @@ impl AnnealedSoftassign {
         }
     }
 
-    /// Whether no further start can do better: an exact answer, or residuals of a dense set so far
-    /// below its spacing that no part can lie aside, or residuals and soft partners that noise
-    /// explains.
+    /// Whether no further start can do better: the answer is exact, or the residuals of a dense set
+    /// are so far below its spacing that no part can be displaced, or noise explains residuals and
+    /// soft partners.
     fn is_done<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
         let points = ws.model.len().min(ws.target.len());
         let (best, matched) = (&ws.best, ws.best.matched / points as f64);
@@ -581,15 +586,15 @@ impl AnnealedSoftassign {
         }
         let unequal = confidence::are_unequal(ws.model.len(), ws.target.len());
         let gain = if unequal { 1.2 } else { MIN_TELLING_GAIN };
-        // Soft partners that spread no more than this, relative to the temperature, are decided. Of
-        // points well apart they spread by 0.05, where a part lies aside by 0.12 to 0.6.
+        // Soft partners that spread less than this, relative to the temperature, are decided. For
+        // well separated points the spread is 0.05; if a part is displaced it is 0.12 to 0.6.
         ws.gain().is_some_and(|found| found >= gain)
             && matched >= 0.9
             && best.tail <= 0.03
             && best.ambiguity <= 0.1
     }
 
-    /// Whether the best run so far explains nearly every point of the smaller set to rounding.
+    /// Whether the best run so far fits nearly all points of the smaller set to rounding.
     pub(super) fn is_exact<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
         let points = ws.model.len().min(ws.target.len());
         let dense = points >= MIN_DENSE_POINTS;
@@ -601,8 +606,8 @@ impl AnnealedSoftassign {
 }
 
 impl<const D: usize> SoftassignWorkspace<D> {
-    /// Whether a run from the motions of blocks kept what they showed: nearly all points that lie
-    /// within the targets' box have a partner, and the pairs make the targets likelier than chance.
+    /// Whether a run from the motions of blocks kept their matches: nearly all points within the
+    /// box of the targets have a partner, and the pairs make the targets likelier than chance.
     pub(super) fn is_likely(&self) -> bool {
         let dense = self.model.len().min(self.target.len()) >= MIN_DENSE_POINTS;
         let sides: [_; D] = std::array::from_fn(|k| {
@@ -612,7 +617,8 @@ impl<const D: usize> SoftassignWorkspace<D> {
         let inside = |w: &&[f64; D]| (0..D).all(|k| sides[k].0 <= w[k] && w[k] <= sides[k].1);
         let inside = self.best.warped.iter().filter(inside).count() as f64;
         let gain = self.gain().unwrap_or(f64::INFINITY);
-        // A surface that has slipped along itself leaves a fifth of a spacing, as noise does.
+        // A surface that slipped along itself leaves residuals of a fifth of a spacing, as noise
+        // does.
         let near = D == 2 || self.best.sigma <= SLIPPED * self.spacing;
         dense
             && near
@@ -624,31 +630,32 @@ impl<const D: usize> SoftassignWorkspace<D> {
     }
 }
 
-/// Temperature of a start from the motions of blocks: no warmer than they leave the points aside.
-/// Sets that lie on each other already would wander along a lattice.
+/// Temperature of a start from the motions of blocks: at most their error. At a higher temperature,
+/// sets that already coincide would drift along a lattice.
 pub(super) fn warmth<const D: usize>(ws: &mut SoftassignWorkspace<D>) -> f64 {
     let spacing = mean_spacing(ws.annealer.volume, &ws.target);
     let miss = ws.motions.miss(&ws.state.warped, &ws.target, spacing);
     (MISSES * miss).clamp(COLDEST * spacing, MOVED.sigma * spacing)
 }
 
-/// Mean distance of neighbours of points that fill a volume.
+/// Mean nearest-neighbour distance of points that fill a volume.
 fn mean_spacing<const D: usize>(volume: f64, points: &[[f64; D]]) -> f64 {
     (volume / points.len() as f64).powf(1.0 / D as f64)
 }
 
-/// Whether the best run so far ended below the noise: so it lost some of its pairs.
+/// Whether the best run so far ended below the noise and so lost some of its pairs.
 pub(super) fn is_cold<const D: usize>(ws: &SoftassignWorkspace<D>) -> bool {
     let smaller = ws.model.len().min(ws.target.len()) as f64;
     ws.best.sigma < 0.1 * ws.spacing && ws.best.matched < 0.95 * smaller
 }
 
-/// Share of the smaller set that a complete answer matches. Dense sets may hold points that are in
-/// one of them alone, but only once another start of the patterns matches no more points: the first
-/// leaves the edges of a cropped set a point aside.
+/// Fraction of the smaller set that a complete answer matches. Dense sets may hold points that
+/// occur in one of them only. This is accepted once a further start from the patterns matches no
+/// more points, because the first such start leaves the edges of a cropped set shifted by one
+/// point.
 fn wanted_share<const D: usize>(ws: &SoftassignWorkspace<D>) -> f64 {
     let dense = ws.model.len().min(ws.target.len()) >= MIN_DENSE_POINTS;
-    // Fewer come and go with the temperature.
+    // Smaller changes of the number come from the temperature.
     let grows = ws.best.matched > 1.005 * ws.matched_before;
     if dense && ws.starts >= 3 && !grows {
         0.8
@@ -658,7 +665,7 @@ fn wanted_share<const D: usize>(ws: &SoftassignWorkspace<D>) -> f64 {
 }
 
 /// Volume of the bounding box of the bulk of points of this radius. Thin sides count as a tenth of
-/// the model's radius.
+/// the radius of the model.
 pub(super) fn bounding_volume<const D: usize>(points: &[[f64; D]], radius: f64) -> f64 {
     let limit = (BULK * radius).max(f64::MIN_POSITIVE);
     let side = |k: usize| {

@@ -1,14 +1,14 @@
-//! Where a run may start: first guesses of the affine part of the warp.
+//! Starts of a run: first guesses of the affine part of the warp.
 
 use super::patterns::Cells;
 use super::{Rotation, mean, squared_distance};
 use nalgebra::{Matrix3, SMatrix, SVector, SymmetricEigen};
 
-/// The model stretched so that centroid and covariance are the target's, and turned by `rotation`
-/// before the stretch.
+/// The model mapped so that its centroid and covariance equal those of the target, with `rotation`
+/// applied before the stretch.
 ///
-/// `A = S C^½ R C^−½` with S the symmetric map that takes the model's covariance C to the target's:
-/// for R = 1 the affine map without rotation.
+/// `A = S C^½ R C^−½`, where S is the symmetric map that takes the model's covariance C to the
+/// target's. For R = 1 this is the affine map without rotation.
 pub(super) fn moments<const D: usize>(
     model: &[[f64; D]],
     target: &[[f64; D]],
@@ -37,10 +37,10 @@ fn covariance<const D: usize>(points: &[[f64; D]], centre: &[f64; D]) -> SMatrix
     sum / points.len() as f64
 }
 
-/// Square root and inverse square root of a covariance, in which directions without extent get a
-/// thousandth of the largest, and the projection onto the other directions.
+/// Square root and inverse square root of a covariance, and the projection onto the directions with
+/// extent. Directions without extent get a thousandth of the largest.
 fn roots<const D: usize>(matrix: &SMatrix<f64, D, D>) -> [SMatrix<f64, D, D>; 3] {
-    // Up to three dimensions, the missing ones filled up with zeros: no allocation.
+    // Up to three dimensions, padded with zeros to avoid allocation.
     let entry = |r: usize, c: usize| if r < D && c < D { matrix[(r, c)] } else { 0.0 };
     let eigen = SymmetricEigen::new(Matrix3::from_fn(entry));
     let floor = (1e-6 * eigen.eigenvalues.max()).max(f64::MIN_POSITIVE);
@@ -59,7 +59,7 @@ fn roots<const D: usize>(matrix: &SMatrix<f64, D, D>) -> [SMatrix<f64, D, D>; 3]
     ]
 }
 
-/// Rotations to try. Limited ones: none, and 30° each way in the plane. Any: every 30° in the
+/// Rotations to try. Limited: the identity and ±30° in the plane. Any: multiples of 30° in the
 /// plane, the 24 rotations of the cube in space.
 pub(super) fn rotations<const D: usize>(
     range: Rotation,
@@ -73,7 +73,7 @@ pub(super) fn rotations<const D: usize>(
         _ => 1,
     };
     (0..count).map(move |k: usize| match D {
-        // 0°, 30°, −30°, 60°, and so on: the small ones first.
+        // 0°, 30°, −30°, 60° and so on, smallest first.
         2 => {
             let angle = 30.0 * k.div_ceil(2) as f64;
             let forth = (k % 2 == 1) == any;
@@ -103,24 +103,24 @@ fn cube<const D: usize>(k: usize) -> SMatrix<f64, D, D> {
     up * turn::<D>(0, 1, (k % 4) as f64 * quarter)
 }
 
-// A start for sets that an affine map takes far: local tuples of points agree on it.
+// A start for sets that differ by a large affine map, on which local tuples of points agree.
 //
-// A model point with D of its neighbours, and a target point with D of its own, determine an affine
-// map. The right pair of tuples puts the model point's other neighbours onto targets, a wrong one
-// does so by chance alone. From the tuples with most hits the map is refitted over larger and
-// larger neighbourhoods, as long as most of them hit. Neither second moments nor centroids enter,
-// so that cropping and outliers do no harm [after Fischler & Bolles, *Random sample consensus*,
-// CACM 24 (1981), with all local tuples in place of a sample].
+// A model point with D of its neighbours and a target point with D of its own determine an affine
+// map. The correct pair of tuples maps the model point's other neighbours onto targets; a wrong
+// pair does so only by chance. From the tuples with the most hits the map is refitted over growing
+// neighbourhoods, as long as most of their points hit. Second moments and centroids are not used,
+// so cropping and outliers do no harm [after Fischler & Bolles, *Random sample consensus*, CACM 24
+// (1981), with all local tuples in place of a sample].
 
-/// Model points tried, nearest the centre first and spread over the inner half.
+/// Number of model points tried, spread over the inner half, the most central first.
 const SEEDS: usize = 12;
-/// Neighbours of a model point that a map is tested on, and of a target that tuples are made of,
-/// for every dimension.
+/// Neighbours of a model point on which a map is tested, and of a target that form tuples, for each
+/// dimension.
 const TESTED: usize = 10;
 const OFFERED: usize = 5;
-/// A hit is a target within this many spacings.
+/// A hit is a target within this distance, in spacings.
 const GATE: f64 = 0.3;
-/// Memory of the start.
+/// Working memory of the start.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tuples<const D: usize> {
     targets: Cells<D>,
@@ -132,8 +132,8 @@ pub(super) struct Tuples<const D: usize> {
 }
 
 impl<const D: usize> Tuples<D> {
-    /// Puts the model to `base` by the map. False where no tuples agree. `limited` leaves out
-    /// rotations beyond some 60°.
+    /// Moves the model to `base` by the map. Returns `false` if no tuples agree. `limited` excludes
+    /// rotations beyond about 60°.
     pub(super) fn find(
         &mut self,
         model: &[[f64; D]],
@@ -162,7 +162,7 @@ impl<const D: usize> Tuples<D> {
             if best.as_ref().is_none_or(|(b, _)| grown > *b) {
                 best = Some((grown, map));
             }
-            // Half the model in one affine piece leaves no doubt.
+            // Half of the model in one affine piece leaves no doubt.
             if grown >= 0.5 * model.len() as f64 {
                 break;
             }
@@ -207,8 +207,8 @@ impl<const D: usize> Tuples<D> {
         self.near.sort_unstable_by(by_distance);
     }
 
-    /// The local map with most hits among the neighbours of a seed, over all targets and tuples of
-    /// their neighbours.
+    /// The local map with the most hits among the neighbours of a seed, over all targets and tuples
+    /// of their neighbours.
     fn best_tuple(
         &mut self,
         model: &[[f64; D]],
@@ -225,10 +225,11 @@ impl<const D: usize> Tuples<D> {
         self.offsets
             .extend(others.map(|&(_, i)| SVector::from(model[i]) - from));
         let (basis, inverse) = best_basis(&self.offsets)?;
-        // Shares of hits: of the neighbours tested, and of a larger neighbourhood after a refit.
+        // Required fraction of hits: among the tested neighbours, and among more neighbours after a
+        // refit.
         let wanted = (0.7 * self.offsets.len() as f64) as usize;
         let mut best = Best::new(wanted);
-        // Misfits are told apart no finer than a tenth of a spacing a point.
+        // Misfits within a tenth of a spacing per point count as equal.
         let equal = 0.01 * spacing * spacing * self.offsets.len() as f64;
         for j in 0..target.len() {
             let to = SVector::from(target[j]);
@@ -287,8 +288,8 @@ impl<const D: usize> Tuples<D> {
         best.map
     }
 
-    /// Neighbours that a map puts onto a target, with the sum of their squared distances. Given up
-    /// when `wanted` is out of reach.
+    /// Number of neighbours that the map puts onto a target, and the sum of their squared
+    /// distances. Stops early if `wanted` is out of reach.
     fn hits(
         &self,
         linear: &SMatrix<f64, D, D>,
@@ -318,8 +319,7 @@ impl<const D: usize> Tuples<D> {
         (hits, misfit)
     }
 
-    /// Refits the map over larger and larger neighbourhoods of the seed. The number of points it
-    /// hits at the end.
+    /// Refits the map over growing neighbourhoods of the seed. Returns the final number of hits.
     fn grow(
         &mut self,
         model: &[[f64; D]],
@@ -341,7 +341,8 @@ impl<const D: usize> Tuples<D> {
                 for &(_, i) in &self.near {
                     let image = map.apply(&model[i]);
                     let Some(j) = self.targets.nearest(&image, GATE * spacing) else {
-                        // A place without any target about is out of sight, not a miss.
+                        // A point without any target nearby is occluded and does not count as a
+                        // miss.
                         if pass == 0 && self.targets.nearest(&image, 1.5 * spacing).is_some() {
                             inside += 1.0;
                         }
@@ -379,9 +380,9 @@ impl<const D: usize> Tuples<D> {
     }
 }
 
-// Affine maps about a pair of points: what determines one, and which are plausible.
+// Affine maps about a pair of points: their construction, and which of them are plausible.
 
-/// Stretches of a local map outside this range are not considered.
+/// Local maps with stretches outside this range are rejected.
 const STRETCH: [f64; 2] = [0.4, 2.5];
 
 /// An affine map about a pair of points.
@@ -393,7 +394,7 @@ struct Local<const D: usize> {
 }
 
 impl<const D: usize> Local<D> {
-    /// Mean square motion of a model of radius one about its centre, which `still` puts among the
+    /// Mean square motion of a model of radius one about its centre, which `still` places among the
     /// targets.
     fn motion(&self, still: &[f64; D]) -> f64 {
         let turned = (self.linear - SMatrix::identity()).norm_squared() / D as f64;
@@ -407,8 +408,9 @@ impl<const D: usize> Local<D> {
     }
 }
 
-/// The best local map so far: the one that hits most, of those the one of least misfit, and of those
-/// that differ by rounding, as of a lattice, the one of least motion.
+/// The best local map so far: the one with the most hits, among those the one with the smallest
+/// misfit, and among those that differ only by rounding (as in a lattice) the one with the least
+/// motion.
 struct Best<const D: usize> {
     hits: usize,
     misfit: f64,
@@ -445,8 +447,8 @@ impl<const D: usize> Best<D> {
     }
 }
 
-/// The D offsets of a point's nearest neighbours that span the most, for their size, and the
-/// inverse of their matrix.
+/// The D offsets to nearest neighbours that span the largest volume for their size, and the inverse
+/// of their matrix.
 fn best_basis<const D: usize>(
     offsets: &[SVector<f64, D>],
 ) -> Option<([usize; D], SMatrix<f64, D, D>)> {
@@ -459,7 +461,7 @@ fn best_basis<const D: usize>(
             *slot = rest % count;
             rest /= count;
         }
-        // One order of every choice.
+        // Each choice in one order only.
         if chosen.windows(2).any(|pair| pair[0] >= pair[1]) {
             continue;
         }
@@ -472,8 +474,8 @@ fn best_basis<const D: usize>(
         let Some(inverse) = columns.try_inverse() else {
             continue;
         };
-        // Near neighbours are more surely in sight together: the spanned volume counts relative to
-        // the lengths.
+        // Close neighbours are more likely to be visible together, so the spanned volume is divided
+        // by the lengths.
         let volume = volume(&columns).abs() / size;
         if volume > best.0 {
             best = (volume, Some((chosen, inverse)));
@@ -494,8 +496,8 @@ pub(super) fn volume<const D: usize>(m: &SMatrix<f64, D, D>) -> f64 {
     }
 }
 
-/// Whether a local map is one that a body could follow: no reflection, no stretch out of range, no
-/// great turn where turns are limited.
+/// Whether a body could follow a local map: no reflection, no stretch out of range, and no large
+/// rotation if rotations are limited.
 fn plausible<const D: usize>(linear: &SMatrix<f64, D, D>, limited: bool) -> bool {
     let [low, high] = STRETCH;
     for k in 0..D {

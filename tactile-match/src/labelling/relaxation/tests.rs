@@ -1,10 +1,10 @@
-//! The building blocks against numbers computed at 80 digits (`reference/matching.json`), and their
-//! properties.
+//! Tests the building blocks against numbers computed with 80 digits (`reference/matching.json`),
+//! and their properties.
 //!
-//! Every quantity is a sum or quotient of few positive terms, so that its relative error is a small
-//! multiple of the rounding unit (1e-12 leaves room for 50 Sinkhorn sweeps). β, `alpha_global` and
-//! γ near zero have no relative accuracy. They are compared relative to one, and what contains them
-//! relative to the support with α alone.
+//! Each quantity is a sum or quotient of few positive terms, so its relative error is a small
+//! multiple of the rounding unit (1e-12 covers 50 Sinkhorn sweeps). β, `alpha_global` and γ near
+//! zero have no relative accuracy: they are compared relative to one, and quantities that contain
+//! them relative to the support with α alone.
 
 use super::*;
 use crate::MatchError;
@@ -14,7 +14,7 @@ use proptest::prelude::*;
 use serde_json::Value;
 use test_support::{numbers, rows};
 
-/// (19) as printed, row-major: the reference of the stored links.
+/// Equation (19) as printed, row-major: the reference for the stored links.
 fn support<const D: usize>(
     m: &MatchMatrix,
     model: &NeighbourGraph<D>,
@@ -38,7 +38,8 @@ fn sweep(m: &mut MatchMatrix, support: &[f64], slack_gain: f64, sinkhorn_sweeps:
     sinkhorn(m, sinkhorn_sweeps, 0.0);
 }
 
-/// Every number is within 1e-12 of the expected one, relative to that or to its floor.
+/// Checks that each number is within 1e-12 of the expected one, relative to the expected value or
+/// to its floor.
 fn check(
     what: &str,
     found: impl IntoIterator<Item = f64>,
@@ -150,8 +151,8 @@ fn run_case<const D: usize>(case: &Value) {
         check(&what, found.iter().copied(), exact(name), floor);
         if let Some(relaxed) = expected["update"].get(name) {
             let gain = case["slack_gain"].as_f64().expect("gain");
-            // By how much the support of an entry is smaller than with α alone: the digits it
-            // cannot have.
+            // The ratio by which an entry's support is smaller than with α alone gives the digits
+            // lost to cancellation.
             let lost: Vec<f64> = exact(name).iter().zip(scale).map(|(s, a)| a / s).collect();
             let what = format!("{id}, {name}");
             check_relaxation(&what, relaxed, (m.clone(), &found, gain), &lost, &graphs);
@@ -208,7 +209,7 @@ fn random_matches(rows: usize, columns: usize, seed: u64) -> MatchMatrix {
     MatchMatrix::from_fn(rows, columns, |_, _| 0.05 + stream.next())
 }
 
-/// `sweeps` sweeps from random matches: everything but the first probabilities.
+/// Runs `sweeps` sweeps from random matches, without the first probabilities.
 fn relaxed<const D: usize>(
     model: &[Point<f64, D>],
     target: &[Point<f64, D>],
@@ -238,8 +239,8 @@ fn neighbourhood(k: usize) -> Neighbourhood {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Of points whose match is settled only the pair they settled on has a support. None is
-    /// settled here.
+    /// If the match of a point is settled, only the settled pair has a support. No point is settled
+    /// here.
     #[test]
     fn links_give_the_printed_support_of_the_candidates(
         seed in 0..1000_u64, rows in 3..14_usize, columns in 3..14_usize, k in 0..5_usize, kept in 1..14_usize,
@@ -255,7 +256,7 @@ proptest! {
         let found = stored.support(&m);
         for (at, expected) in printed.into_iter().enumerate() {
             let candidate = m[(at / columns, at % columns)] > 0.0;
-            // The same positive terms in another order.
+            // The same positive terms, summed in another order.
             let wanted = if candidate { expected } else { 0.0 };
             prop_assert!((found[at] - wanted).abs() <= 1e-13 * expected);
         }
@@ -273,7 +274,7 @@ proptest! {
         let m = random_matches(rows, columns, seed);
         let plain = relaxed(&model, &target, m.clone(), neighbourhood(k));
         let other = relaxed(&moved(&model), &moved(&target), m, neighbourhood(k));
-        // Lengths keep 14 digits, three sweeps of sums and quotients a few less.
+        // Lengths keep 14 digits, and three sweeps of sums and quotients slightly fewer.
         prop_assert!(plain.largest_change(&other) <= 1e-9);
     }
 
@@ -281,7 +282,7 @@ proptest! {
     fn sinkhorn_makes_rows_and_columns_sum_to_one(rows in 1..12_usize, columns in 1..12_usize, seed in 0..1000_u64) {
         let mut m = random_matches(rows, columns, seed);
         let defect = sinkhorn(&mut m, 10_000, 1e-12);
-        // Positive entries with slack on both sides: always feasible, linear convergence.
+        // Positive entries with slack on both sides are always feasible, and convergence is linear.
         prop_assert!(defect <= 1e-12, "{}", defect);
         for j in 0..columns {
             let sum: f64 = (0..=rows).map(|i| m[(i, j)]).sum();
@@ -423,8 +424,8 @@ fn relaxation_has_all_its_digits() {
         };
         let found = support(&m, &graph("model"), &graph("target"), &rule);
         for (found, expected) in found.iter().zip(rows(&case["support"]).concat()) {
-            // A sum of positive terms, each of some ten roundings; β loses no more than one part in
-            // its own size.
+            // A sum of positive terms with about ten roundings each. β loses no more than one part
+            // of its own size.
             table.enter(
                 &format!("support, {name}"),
                 (found / expected - 1.0).abs() / f64::EPSILON,
@@ -434,7 +435,7 @@ fn relaxation_has_all_its_digits() {
         sinkhorn(&mut m, case["sweeps"].as_u64().unwrap() as usize, 0.0);
         for (i, row) in rows(&case["sinkhorn"]).iter().enumerate() {
             for (j, &expected) in row.iter().enumerate().filter(|(_, x)| **x > 0.0) {
-                // Seven sweeps of a sum of six and a quotient, twice: 14 × 7 roundings.
+                // Seven sweeps of a sum of six and a quotient, done twice: 14 × 7 roundings.
                 let units = (m[(i, j)] / expected - 1.0).abs() / f64::EPSILON;
                 table.enter(&format!("Sinkhorn, {name}"), units, 98.0);
             }

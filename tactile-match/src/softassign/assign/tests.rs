@@ -39,7 +39,7 @@ mod soft_assign {
         for i in 0..37 {
             let slack = f64::from(soft.row_scale[i]) * 0.05;
             let sum: f64 = soft.entries(i).map(|(_, p)| p).sum();
-            // Single precision sums of 41 terms, at the fixed point of the sweeps.
+            // Single-precision sums of 41 terms, at the fixed point of the sweeps.
             assert!(
                 (sum + slack - 1.0).abs() < 1e-5 && (sum - soft.moments.weight[i]).abs() < 1e-5
             );
@@ -61,7 +61,7 @@ mod soft_assign {
             sparse = sparse.max(37 * 3 - soft.active.len());
             for i in 0..37 {
                 for (j, p) in soft.entries(i) {
-                    // Forty affinities of 1e-7 each, over a slack of 1e-2.
+                    // Forty affinities of 1e-7 each are dropped, compared with a slack of 1e-2.
                     assert!(least == 1e-30 || (p - near[i][j]).abs() < 4e-4);
                     near[i][j] = p;
                 }
@@ -93,12 +93,12 @@ mod blocks {
         );
         for (place, &j) in blocks.order.iter().enumerate() {
             let distance = (points[j][0] - 20.0).powi(2) + (points[j][1] - 30.0).powi(2);
-            // Whole numbers below 2¹⁴ are exact in single precision.
+            // Integers below 2¹⁴ squared and summed are exact in single precision.
             assert!(f64::from(squared[place / LANES]) <= distance, "{place}");
         }
     }
 
-    /// In a set of many groups the blocks found are those found one by one.
+    /// In a set of many groups, the hierarchical search finds the same blocks as a linear scan.
     #[test]
     fn groups_leave_out_no_block_in_reach() {
         let points: Vec<[f64; 2]> = (0..12_003)
@@ -133,7 +133,8 @@ mod lanes {
         for i in 0..2000 {
             let x = -0.043 * i as f32;
             let (found, expected) = (f64::from(exp(x)), f64::from(x).exp());
-            // Two units of single precision; below the normal range zero is right.
+            // Two units in the last place of single precision. Below the normal range zero is
+            // correct.
             assert!(
                 (found - expected).abs() <= 2.4e-7 * expected + 1e-37,
                 "{x}: {found} {expected}"

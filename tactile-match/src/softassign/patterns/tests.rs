@@ -5,7 +5,8 @@ mod cells {
     use proptest::prelude::*;
 
     proptest! {
-        /// Against every point looked at, negative coordinates and crowded cells included.
+        /// Compares with a linear scan over all points, including negative coordinates and crowded
+        /// cells.
         #[test]
         fn what_is_near_is_found(
             points in prop::collection::vec(prop::array::uniform3(-3.0..3.0_f64), 1..60),

@@ -32,7 +32,7 @@ fn points_that_nearly_coincide_or_sizes_out_of_all_range_are_fitted_at_once() {
     for step in [1e-200, 1e200] {
         assert!(!are_apart(&lattice(step)));
     }
-    // The twins go different ways: the positions become those of a smoothed spline.
+    // The coincident points move apart, so the positions become those of a smoothed spline.
     let mut warped = model.clone();
     model[25] = model[11];
     warped[25].x += 0.5;

@@ -3,8 +3,8 @@
 use super::*;
 use nalgebra::{DMatrix, DVector};
 
-/// The energy from the low-rank factors is that of the dense covariance:
-/// `½ zᵀ(K + σ²W⁻¹)⁻¹z + ½ ln det(1 + K W/σ²)` an axis.
+/// The energy from the low-rank factors equals that of the dense covariance:
+/// `½ zᵀ(K + σ²W⁻¹)⁻¹z + ½ ln det(1 + K W/σ²)` per axis.
 #[test]
 fn the_evidence_is_that_of_the_dense_covariance() {
     const N: usize = 24; // a multiple of the padding
@@ -43,7 +43,7 @@ fn the_evidence_is_that_of_the_dense_covariance() {
         z.dot(&factor.solve(&z))
     };
     let expected = 0.5 * (square(&wanted.0[0]) + square(&wanted.0[1])) + log_det;
-    // The modes left out are a hundredth of the noise each.
+    // Each truncated mode is a hundredth of the noise.
     assert!(
         (found - expected).abs() < 0.02 * expected.abs(),
         "{found} {expected}"

@@ -2,13 +2,13 @@
 
 use super::*;
 
-/// A number of (−1, 1), without pattern.
+/// A scattered number in (−1, 1).
 fn scatter(i: usize, k: usize) -> f64 {
     2.0 * ((i * i) as f64 * 0.618_033_988_75 + (i * (k + 1)) as f64 * 0.754_877_666_25).fract()
         - 1.0
 }
 
-/// A jittered grid stretched by 1.7 and cropped to where it was, with one outlier in ten.
+/// A jittered grid is stretched by 1.7 and cropped to its former window, with one outlier in ten.
 #[test]
 fn a_stretched_and_cropped_grid_is_put_onto_its_targets() {
     let model: Vec<[f64; 2]> = (0..225)
@@ -30,7 +30,7 @@ fn a_stretched_and_cropped_grid_is_put_onto_its_targets() {
     assert!(tuples.find(&model, &target, 0.12, true, &[0.0; 2], &mut base));
     for (p, b) in model.iter().zip(&base) {
         let truth = moved(p);
-        // Well below the spacing: the fit is to exact pairs, and a few outliers that were hit.
+        // Well below the spacing: the fit uses exact pairs and a few outliers hit by chance.
         assert!(
             (b[0] - truth[0]).hypot(b[1] - truth[1]) < 0.05,
             "{p:?}: {b:?}"
