@@ -1,4 +1,4 @@
-//! Covariance of ring means: the sensor's errors and the model's.
+//! Covariance of ring means: errors of the sensor and of the model.
 
 use crate::forward::Forward;
 use crate::picture::CellPositions;
@@ -7,45 +7,47 @@ use nalgebra::DMatrix;
 use std::sync::Arc;
 use tactile_fem::Interface;
 
-/// Points of the half circle that a kernel is averaged over. The integrand is periodic and smooth but
-/// for a kink of the third derivative: four digits.
+/// Number of points on the half circle for averaging a kernel. The integrand is periodic and smooth
+/// except for a kink of the third derivative, which leaves four digits.
 const RING_POINTS: i32 = 48;
 
-/// How far the finite elements are from another code's pressure within three quarters of the face,
-/// relative.
+/// Relative errors of the finite elements, from a comparison with the pressure of another code
+/// within three quarters of the face.
 #[derive(Debug, Clone, Copy)]
 struct ModelErrors {
-    /// Of all pressures and forces together.
+    /// Common factor of all pressures and forces.
     scale: f64,
-    /// Of the profile's shape, correlated over [`SHAPE_LENGTH`] times the outermost radius.
+    /// Error of the profile's shape, correlated over [`SHAPE_LENGTH`] times the outermost radius.
     shape: f64,
-    /// What the rim's singular pressure sends inwards, which grows with the square of the radius,
-    /// at the outermost one: codes resolve a singularity differently.
+    /// Effect of the singular pressure at the rim, at the outermost radius: codes resolve a
+    /// singularity differently. It grows with the square of the radius.
     rim: f64,
-    /// What elements leave of the pressure within their length, correlated over `element` times the
+    /// Error of the pressure on the scale of the elements, correlated over `element` times the
     /// outermost radius.
     rough: f64,
     element: f64,
-    /// Of the forces beyond the pressures': most of it sits at the guide's rim.
+    /// Error of the forces in addition to that of the pressures. Most of it arises at the rim of
+    /// the guide.
     force: f64,
-    /// What the rim sends inwards beyond `rim` as the face sinks in, at the outermost radius and
-    /// the last frame. It grows with the sixth power of the radius and with the load. Half of its
-    /// variance is correlated over `element`: waves of the elements' length.
+    /// Additional effect of the rim as the face sinks in, at the outermost radius and the last
+    /// frame. It grows with the sixth power of the radius and with the load. Half of its variance
+    /// is correlated over `element`, from waves of the elements' length.
     sinking: f64,
-    /// The same of the forces.
+    /// Corresponding error of the forces.
     sinking_force: f64,
-    /// What the pressure's radial share on the bent face would add, which the model leaves out. In
-    /// the last frame, correlated as the shape, growing with the load.
+    /// Effect of the radial component of the pressure on the bent face, which the model neglects.
+    /// The value is for the last frame, is correlated like the shape, and grows with the load.
     bent: f64,
 }
 
-/// Correlation length of the shape's error over the outermost radius.
+/// Correlation length of the shape error, relative to the outermost radius.
 const SHAPE_LENGTH: f64 = 0.4;
 
-/// Against CalculiX, over bonded blocks with and without inclusion: all pressures 0.05 to 0.2 %
-/// low, the shape within 0.1 %, lower by 0.05 to 0.3 % towards the rim. There are waves of 0.05 to
-/// 0.1 % there, forces 0.1 to 1 % low. What grows as the face sinks in: between meshes of 5 and 10
-/// elements an eighth, 0.1 % at the outermost radius and 0.3 % of the force.
+/// Comparison with CalculiX for bonded blocks with and without an inclusion: all pressures are 0.05
+/// to 0.2 % low; the shape agrees within 0.1 % and is low by 0.05 to 0.3 % towards the rim, with
+/// waves of 0.05 to 0.1 %; forces are 0.1 to 1 % low. The part that grows as the face sinks in is
+/// the difference between meshes with 5 and 10 elements per eighth: 0.1 % at the outermost radius
+/// and 0.3 % of the force.
 const BONDED: ModelErrors = ModelErrors {
     scale: 2e-3,
     shape: 7e-4,
@@ -58,14 +60,15 @@ const BONDED: ModelErrors = ModelErrors {
     bent: 0.0,
 };
 
-/// The same, without friction: all pressures 0.05 to 0.25 % low, the shape within 0.1 %, lower by
-/// up to 0.2 % towards the rim in soft tissue and by 0.85 % in tissue a third as stiff as the
-/// guide. Over eight blocks of `evidence/inclusion_scenes.py` that is 0.5 % root mean square. Four
-/// fifths of it go where CalculiX's elements at the rim are made a quarter as long, but data are as
-/// they are. Up to 0.4 % on the axis above a shallow inclusion, forces 0.2 to 1.3 % low. What
-/// grows: between rim elements of 0.02, 0.05 and 0.08 radii, 0.1 to 0.25 % at the outermost radius.
-/// The radial share, put in as forces on the nodes at a tenth of the block's height, bends the
-/// profile by 0.15 % across an inclusion. It does so by more above a shallow one.
+/// Comparison without friction: all pressures are 0.05 to 0.25 % low. The shape agrees within 0.1 %
+/// and is low towards the rim by up to 0.2 % in soft tissue, and by 0.85 % in tissue a third as
+/// stiff as the guide; over eight blocks of `evidence/inclusion_scenes.py` the root mean square is
+/// 0.5 %. Four fifths of this disappear if CalculiX's elements at the rim are a quarter as long,
+/// but the data were not computed in that way. On the axis above a shallow inclusion the difference
+/// is up to 0.4 %, and forces are 0.2 to 1.3 % low. The growing part is 0.1 to 0.25 % at the
+/// outermost radius, between rim elements of 0.02, 0.05 and 0.08 radii. The radial component,
+/// applied as nodal forces at a tenth of the block's height, bends the profile by 0.15 % across an
+/// inclusion, and more above a shallow one.
 const FRICTIONLESS: ModelErrors = ModelErrors {
     scale: 2e-3,
     shape: 1.2e-3,
@@ -78,17 +81,17 @@ const FRICTIONLESS: ModelErrors = ModelErrors {
     bent: 1.5e-3,
 };
 
-/// Which mesh a covariance is for.
+/// The mesh to which a covariance applies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Resolution {
-    /// The answer's.
+    /// The mesh of the final fit.
     Answer,
-    /// That of the first fits.
+    /// The mesh of the first fits.
     FirstFits,
 }
 
 impl ModelErrors {
-    /// `part` of the model's error counts.
+    /// Creates the errors. `part` is the fraction of the model's error that is included.
     fn new(interface: Interface, resolution: Resolution, part: f64) -> Self {
         let whole = match interface {
             Interface::Bonded => BONDED,
@@ -107,7 +110,7 @@ impl ModelErrors {
         };
         match resolution {
             Resolution::Answer => fine,
-            // Half a percent where there is room, up to 2 % above a shallow inclusion.
+            // Half a per cent for a deep inclusion, up to 2 % above a shallow one.
             Resolution::FirstFits => Self {
                 rough: 8e-3,
                 element: 0.2,
@@ -117,7 +120,7 @@ impl ModelErrors {
     }
 }
 
-/// Matérn's kernel of order 3/2 between points of two rings, averaged over their angle.
+/// Matérn kernel of order 3/2 between points of two rings, averaged over their angle.
 fn ring_kernel(a: f64, b: f64, length: f64) -> f64 {
     let mut sum = 0.0;
     for k in 0..RING_POINTS {
@@ -128,57 +131,57 @@ fn ring_kernel(a: f64, b: f64, length: f64) -> f64 {
     sum / f64::from(RING_POINTS)
 }
 
-/// Values of all frames: the pressures of one after the other, then the forces.
+/// Values of all frames: the pressures of each frame in turn, then the forces.
 #[derive(Debug, Clone)]
 pub(crate) struct Observed {
     pub radii_m: Vec<f64>,
     pub values: Vec<f64>,
-    /// White errors. Infinite for a force that is not known.
+    /// White errors. Infinite for an unknown force.
     pub white: Vec<f64>,
     pub frames: usize,
-    /// Of a whole face.
+    /// Data of a whole face.
     pub cells: Option<ObservedCells>,
 }
 
-/// Cells of a face on which pressures were measured.
+/// Cells of a face with measured pressures.
 #[derive(Debug, Clone)]
 pub(crate) struct ObservedCells {
     pub positions: Arc<CellPositions>,
-    /// Standard error of a press's place, each way.
+    /// Standard error of a press's position along each axis.
     pub place_error_m: f64,
-    /// Standard error of the zero that the approaches of one press have of its own.
+    /// Standard error of the approach zero that is specific to one press.
     pub zero_error_m: f64,
-    /// The reciprocal of each frame's approach.
+    /// The reciprocal approach of each frame.
     pub per_approach: Vec<f64>,
-    /// Mean of each value and that of the cell on the other side of the axis, over the value: a
-    /// tilted face's pressure without its tilt.
+    /// Mean of each value and that of the opposite cell across the axis, relative to the value: the
+    /// pressure of a tilted face without the tilt.
     pub even: Vec<f64>,
-    /// Relative error of the pressure of an inclusion off the axis, of each cell.
+    /// Relative error of the pressure of an off-axis inclusion, for each cell.
     pub aside: Vec<f64>,
 }
 
-/// Error of the pressure of an inclusion off the axis, over its distance from the axis in radii of
-/// the face and the part by which it lifts the pressure. Solutions in three dimensions differ by 0.2
-/// to 0.6 % of the pressure at 0.25 to 0.5 radii, of lumps that lift it by a fifth to twice.
+/// Error of the pressure of an off-axis inclusion, relative to its distance from the axis in radii
+/// of the face and to the relative increase of pressure that it causes. Solutions in three
+/// dimensions differ by 0.2 to 0.6 % of the pressure at 0.25 to 0.5 radii, for inclusions that
+/// raise the pressure by a fifth to a factor of three.
 const ASIDE: f64 = 0.034;
 
-/// What elements leave of the pressure on a whole face within their length, beyond what they leave
-/// of rings: another code's solutions of plain blocks in three dimensions scatter by 0.12 to
-/// 0.25 %.
+/// Error of the pressure on a whole face on the scale of the elements, in addition to that of
+/// rings: another code's solutions of plain blocks in three dimensions scatter by 0.12 to 0.25 %.
 const ROUGH_PICTURE: f64 = 2e-3;
 
 /// Standard error of the angle between face and block, in radians: two degrees.
 const TILT: f64 = 0.035;
 
-/// Matérn's kernel of order 3/2.
+/// Matérn kernel of order 3/2.
 fn kernel(distance: f64, length: f64) -> f64 {
     let scaled = 3f64.sqrt() * distance / length;
     (1.0 + scaled) * (-scaled).exp()
 }
 
 impl ObservedCells {
-    /// Cells with their values, one frame after the other. `zero_error_m` is the standard error of
-    /// the zero of a press's approaches, which presses of a scan have each.
+    /// Cells with their values, frame by frame. `zero_error_m` is the standard error of the
+    /// approach zero specific to each press of a scan.
     pub(crate) fn new(
         positions: CellPositions,
         [place_error_m, zero_error_m]: [f64; 2],
@@ -214,14 +217,15 @@ impl ObservedCells {
         }
     }
 
-    /// Whether two cells are of one press.
+    /// Whether two cells belong to the same press.
     fn is_one_press(&self, i: usize, j: usize) -> bool {
         self.positions.presses[i] == self.positions.presses[j]
     }
 }
 
 impl Observed {
-    /// Each frame's pressure over the last one's: as large a part of its approach, nearly.
+    /// Pressure of each frame relative to the last one. This is nearly the ratio of their
+    /// approaches.
     fn loads(&self) -> Vec<f64> {
         let rings = self.radii_m.len();
         let sums = self.values[..self.frames * rings].chunks(rings);
@@ -230,17 +234,17 @@ impl Observed {
         sums.into_iter().map(|sum| sum / last).collect()
     }
 
-    /// These values with a relative error of the pressure that two inclusions have together, in
-    /// quadrature with that of each.
+    /// Adds the relative error of the combined pressure of two inclusions, in quadrature with the
+    /// errors of each.
     pub(crate) fn with_neighbours(mut self, error: f64) -> Self {
         let aside = self.cells.iter_mut().flat_map(|cells| &mut cells.aside);
         aside.for_each(|aside| *aside = aside.hypot(error));
         self
     }
 
-    /// These values with the error of the pressure of an inclusion off the axis that lifts the
-    /// pressure by this part, in quadrature with that of another. Far from a face it fades with
-    /// what the inclusion adds there.
+    /// Adds the error of the pressure of an off-axis inclusion that raises the pressure by this
+    /// fraction, in quadrature with that of another inclusion. Far from a face the error fades
+    /// together with the inclusion's contribution.
     pub(crate) fn with_lump_aside(&self, centre_m: [f64; 2], forward: &Forward, lift: f64) -> Self {
         let mut observed = self.clone();
         if let (Some(cells), Some(face)) = (&mut observed.cells, &forward.cells) {
@@ -258,15 +262,15 @@ impl Observed {
         observed
     }
 
-    /// Covariance of the relative errors of two cells by an inclusion off the axis.
+    /// Covariance of the relative errors of two cells because of an off-axis inclusion.
     fn aside(&self, i: usize, j: usize) -> f64 {
         let cells = self.cells.as_ref().filter(|cells| cells.is_one_press(i, j));
         cells.map_or(0.0, |cells| cells.aside[i] * cells.aside[j])
     }
 
-    /// Covariance of the relative pressures of two cells of a press in two frames by the angle
-    /// between face and block, θ: a rigid punch's pressure grows by 2 θ x / δ at the approach δ.
-    /// And by the zero of the press's approaches. Ring means have none.
+    /// Covariance of the relative pressures of two cells of a press in two frames, because of the
+    /// angle θ between face and block and the zero of the press's approaches. The pressure of a
+    /// rigid punch grows by 2 θ x / δ at the approach δ. Ring means are not affected.
     fn posture(&self, i: usize, j: usize, k: usize, l: usize) -> f64 {
         let Some(cells) = &self.cells else {
             return 0.0;
@@ -278,7 +282,7 @@ impl Observed {
         (tilt + cells.zero_error_m.powi(2)) * cells.per_approach[k] * cells.per_approach[l]
     }
 
-    /// Covariance of the values. Relative errors are of the values observed.
+    /// Covariance of the values. Relative errors refer to the observed values.
     pub(crate) fn covariance(
         &self,
         sensor: &SensorErrors,
@@ -308,8 +312,8 @@ impl Observed {
                 let smooth = correlation(i, j, sensor.correlation_m);
                 let wide = correlation(i, j, SHAPE_LENGTH * outermost);
                 let short = correlation(i, j, model.element * outermost);
-                // Presses share what belongs to sensor and rim. What goes with the inclusion, the
-                // tilt and the errors of frames and of place are each press's own.
+                // Presses share the errors of sensor and rim. The errors of inclusion, tilt, frames
+                // and position are specific to each press.
                 let is_one_press =
                     (self.cells.as_ref()).is_none_or(|cells| cells.is_one_press(i, j));
                 let own = if is_one_press { 1.0 } else { 0.0 };

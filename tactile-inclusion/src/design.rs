@@ -1,4 +1,4 @@
-//! What a scan can tell before it is made.
+//! Expected errors of a scan before it is made.
 
 use crate::covariance::{Observed, Resolution};
 use crate::fit::Problem;
@@ -8,12 +8,12 @@ use crate::search::InclusionSearch;
 use crate::tissue_block::check_approaches;
 use tactile_elasticity::{ElasticityError, Quantity};
 
-/// Elements along an eighth of the inclusion's circumference: errors within 2 % of those of a
-/// mesh twice as fine; of three elements, the errors of a small shallow inclusion came out at
-/// half.
+/// Elements along an eighth of the inclusion's circumference. The expected errors are within 2 % of
+/// those of a mesh twice as fine. With three elements, the errors of a small shallow inclusion were
+/// half as large as they should be.
 const FINENESS: usize = 5;
 
-/// An inclusion assumed for planning a scan.
+/// An inclusion that is assumed for planning a scan.
 ///
 /// ```
 /// use tactile_inclusion::AssumedInclusion;
@@ -34,11 +34,11 @@ pub struct AssumedInclusion {
     pub depth_m: f64,
     /// Young's modulus E₁, in pascals.
     pub youngs_modulus_pa: f64,
-    /// The tissue's Young's modulus E₀, in pascals.
+    /// Young's modulus of the tissue E₀, in pascals.
     pub block_modulus_pa: f64,
 }
 
-/// Relative standard errors that a scan would leave.
+/// Relative standard errors expected from a scan.
 ///
 /// ```
 /// use tactile_inclusion::ExpectedErrors;
@@ -49,27 +49,29 @@ pub struct AssumedInclusion {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ExpectedErrors {
-    /// Of the diameter.
+    /// Error of the diameter.
     pub diameter: f64,
-    /// Of the depth.
+    /// Error of the depth.
     pub depth: f64,
-    /// Of the inclusion's modulus.
+    /// Error of the inclusion's modulus.
     pub youngs_modulus: f64,
 }
 
 impl InclusionSearch {
-    /// Standard errors of ln D, ln d and ln E₁ that frames at `approaches_m` would leave, were the
-    /// assumed inclusion there: the Cramér–Rao bound
+    /// Standard errors of ln D, ln d and ln E₁ from frames at `approaches_m`, if the assumed
+    /// inclusion is present. They are the Cramér–Rao bound
     ///
     /// $$ (J^T C^{-1} J + P^{-1})^{-1} $$
     ///
-    /// with what is known of block, sensor and shape. `white_pa` is the white error of each ring's
-    /// mean: a pixel's over the root of the ring's pixels, larger near the axis. The face counts as
-    /// bonded unless the specimen says otherwise. One solution with derivatives.
+    /// with the prior knowledge of block, sensor and shape. `white_pa` is the white error of each
+    /// ring's mean: the error of a pixel over the root of the ring's pixel count, larger near the
+    /// axis. The face is assumed bonded unless the specimen specifies its interface. The cost is
+    /// one solution with derivatives.
     ///
     /// # Errors
-    /// A length, modulus or error that is not positive. Approaches that do not grow. Not one error
-    /// for each ring. Fewer than eight rings within reach. [`ElasticityError::NoSolution`].
+    /// An error for a length, modulus or error that is not positive, approaches that do not
+    /// increase, a number of errors different from that of the rings, or fewer than eight rings
+    /// within reach. Also [`ElasticityError::NoSolution`].
     pub fn expected_errors(
         &self,
         assumed: &AssumedInclusion,
@@ -107,7 +109,7 @@ impl InclusionSearch {
         observed.white = (0..observed.frames)
             .flat_map(|_| used.iter().map(|&ring| white_pa[ring]))
             .collect();
-        // Forces have no noise of pixels.
+        // The pixel noise does not affect forces.
         observed.white.resize(predicted.len(), 0.0);
         observed.values = predicted;
         let covariance = observed.covariance(self.sensor(), interface, Resolution::Answer);

@@ -1,20 +1,20 @@
-//! What a search found.
+//! Results of a search.
 
 use std::fmt;
 use tactile_fem::Interface;
 
-/// Relative standard error above which a parameter is not identified, on the side where its
-/// interval reaches further: a modulus that may be far higher is not identified by being bounded
-/// from below. On 162 scenes of `evidence/inclusion_scenes.py`, none of 60 parameters that a
-/// sensor cannot know within 30 % was told (`inclusion_study`); the price is that some it could
-/// know within 20 to 30 % are left open.
+/// Relative standard error above which a parameter is not identified. The longer side of its
+/// interval counts: a modulus that may be far higher is not identified by a lower bound. In 162
+/// scenes of `evidence/inclusion_scenes.py`, none of the 60 parameters that a sensor cannot
+/// determine within 30 % was reported as identified (`inclusion_study`). In exchange, some that it
+/// could determine within 20 to 30 % stay open.
 const OPEN: f64 = 0.25;
 
-/// 1 % of asymmetry is harmless, 6 % is not.
+/// An asymmetry of 1 % is harmless, 6 % is not.
 const LARGEST_ASYMMETRY: f64 = 0.03;
 
 /// Smooth errors of a sensor (0.3 % over 3 mm) reach 0.4 % in one picture of 100. An ellipsoid of
-/// 14 × 10 × 8 mm has 1.9 %.
+/// 14 × 10 × 8 mm gives 1.9 %.
 const LARGEST_HARMONICS: f64 = 0.006;
 
 /// A value with its standard error and its 95 % interval.
@@ -31,16 +31,16 @@ const LARGEST_HARMONICS: f64 = 0.006;
 pub struct Estimated {
     /// The value.
     pub value: f64,
-    /// Its standard error.
+    /// Standard error of the value.
     pub standard_error: f64,
-    /// The 95 % interval.
+    /// 95 % interval of the value.
     #[cfg_attr(feature = "serde", serde(rename = "interval_95"))]
     pub interval: [f64; 2],
 }
 
 impl Estimated {
-    /// From a logarithm and the ends of its 95 % interval. The standard error is that of a Gaussian
-    /// with an interval as wide.
+    /// Creates the estimate from a logarithm and the ends of its 95 % interval. The standard error
+    /// is that of a Gaussian with an interval of equal width.
     pub(crate) fn within(logarithm: f64, [low, high]: [f64; 2]) -> Self {
         let value = logarithm.exp();
         Self {
@@ -50,7 +50,7 @@ impl Estimated {
         }
     }
 
-    /// From the ends of its 95 % interval.
+    /// Creates the estimate from the ends of its 95 % interval.
     pub(crate) fn new(value: f64, [low, high]: [f64; 2]) -> Self {
         Self {
             value,
@@ -59,7 +59,7 @@ impl Estimated {
         }
     }
 
-    /// With another standard error in quadrature.
+    /// Adds another standard error in quadrature.
     pub(crate) fn widened(&self, error: f64) -> Self {
         let reach = |end: f64| (end - self.value).hypot(TWO_SIDED_95 * error);
         let [low, high] = self.interval.map(reach);
@@ -72,10 +72,10 @@ impl Estimated {
     }
 }
 
-/// Standard deviations that 95 % of a Gaussian lie within.
+/// Half width of the 95 % interval of a Gaussian, in standard deviations.
 pub(crate) const TWO_SIDED_95: f64 = 1.959_963_984_540_054;
 
-/// A parameter of an inclusion: identified, or left open.
+/// A parameter of an inclusion, identified or open.
 ///
 /// ```
 /// use tactile_inclusion::{Estimated, Identifiable};
@@ -87,9 +87,9 @@ pub(crate) const TWO_SIDED_95: f64 = 1.959_963_984_540_054;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Identifiable {
-    /// Known within 25 % (one standard error) both ways.
+    /// The parameter is known within 25 % (one standard error) on both sides.
     Yes(Estimated),
-    /// The data leave it open: what prior and data allow together.
+    /// The data leave the parameter open. The estimate combines prior and data.
     No(Estimated),
 }
 
@@ -104,7 +104,7 @@ impl Identifiable {
         }
     }
 
-    /// The value, where it is identified.
+    /// The value. `None` if the parameter is not identified.
     pub fn value(&self) -> Option<f64> {
         match self {
             Self::Yes(estimated) => Some(estimated.value),
@@ -120,7 +120,7 @@ impl Identifiable {
     }
 }
 
-/// The estimate, and `told`: whether it is identified.
+/// Serialises the estimate, with `told` for whether it is identified.
 #[cfg(feature = "serde")]
 impl serde::Serialize for Identifiable {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -148,25 +148,26 @@ impl serde::Serialize for Identifiable {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Inclusion {
-    /// Its middle (x, y) from the face's axis, in metres. `None` from ring means: under the axis.
+    /// Position (x, y) of its centre relative to the axis of the face, in metres. `None` for ring
+    /// means, which assume an inclusion on the axis.
     pub position_m: Option<[Estimated; 2]>,
-    /// Diameter D of the ball of equal volume, in metres: the posterior's median.
+    /// Diameter D of the ball of equal volume, in metres: median of the posterior.
     pub diameter_m: Identifiable,
-    /// Depth of its top d, in metres: the posterior's median.
+    /// Depth d of its top, in metres: median of the posterior.
     pub depth_m: Identifiable,
-    /// Young's modulus E₁, in pascals: of the best fit, for how stiff it may be at most is often
-    /// known from the prior alone.
+    /// Young's modulus E₁ of the best fit, in pascals. It is not the median, because the upper
+    /// limit of the stiffness often comes from the prior alone.
     pub youngs_modulus_pa: Identifiable,
-    /// Height along the axis over the width across it: the posterior's median. `None` where it was
-    /// said to be a ball.
+    /// Height along the axis over width across it: median of the posterior. `None` if the inclusion
+    /// is assumed to be a ball.
     pub height_over_width: Option<Estimated>,
-    /// Probability that it is a ball, where it is as likely as not beforehand.
+    /// Probability that the inclusion is a ball, with a prior probability of one half.
     pub ball_probability: f64,
     /// Correlations of ln D, ln d and ln E₁.
     pub correlation: [[f64; 3]; 3],
 }
 
-/// What weakens an estimate.
+/// A reservation about an estimate.
 ///
 /// ```
 /// use tactile_inclusion::InclusionWarning;
@@ -182,43 +183,44 @@ pub struct Inclusion {
 )]
 #[non_exhaustive]
 pub enum InclusionWarning {
-    /// The best fit leaves more than the errors explain (below 1 chance in 1000): several
-    /// inclusions, one off the axis, a stiffer skin, or errors larger than stated. Errors are
-    /// widened by the root of the excess, and no parameter counts as identified.
+    /// The best fit leaves residuals above the errors (probability below 0.001). Possible reasons
+    /// are several inclusions, an off-axis inclusion, a stiffer skin, or understated errors. Errors
+    /// are widened by the root of the excess, and no parameter is identified.
     PoorFit {
         /// χ² over its degrees of freedom.
         excess: f64,
     },
-    /// One frame: size and stiffness are told apart by how the pressure grows with the approach.
+    /// There is only one frame, whereas size and stiffness are separated by the growth of the
+    /// pressure with the approach.
     OneFrame,
-    /// The fit ended before it settled.
+    /// The fit stopped before it converged.
     NotConverged,
-    /// Bonded and frictionless faces explain the frames about equally well: the better one's values
-    /// are given, with intervals that hold those of both. Or one of them could not be solved, and
-    /// no parameter counts as identified.
+    /// Bonded and frictionless faces fit the frames about equally well: the values are those of the
+    /// better one, and the intervals cover both. If one of them could not be solved, no parameter
+    /// is identified.
     UncertainInterface,
-    /// The inclusion lies nearer to the surface or to the stage than half an element: the model
-    /// does not reach that far.
+    /// The inclusion is closer to the surface or to the stage than half an element, where the model
+    /// does not apply.
     AtBoundary,
-    /// A sixth of the inclusion or more lies under the rim of the face: the model places it, and
-    /// does not reach its size.
+    /// A sixth of the inclusion or more lies under the rim of the face: its position is determined,
+    /// but not its size.
     AtRim,
-    /// The pressure is larger on one side of the axis by more than 3 %: an inclusion off the axis,
-    /// several, or a tilted block. The model is symmetric.
+    /// The pressure is more than 3 % larger on one side of the axis: an off-axis inclusion, several
+    /// inclusions, or a tilted block. The model is symmetric.
     Asymmetric {
-        /// First harmonic of the pressure around the axis over its mean.
+        /// First harmonic of the pressure around the axis, relative to its mean.
         asymmetry: f64,
     },
-    /// The inclusion is no ball: seen from above its axes differ. The model is a ball, and neither
-    /// size nor depth nor modulus can be told.
+    /// The inclusion is not a ball: its axes differ as seen from above. The model assumes a ball,
+    /// so size, depth and modulus are undetermined.
     NotABall {
         /// Ratio of the axes.
         axes: f64,
     },
     /// The pressure around the axis has second to fourth harmonics above 0.6 %: a lump that is not
-    /// round, several, or one off the axis. The model is symmetric.
+    /// round, several lumps, or one off the axis. The model is symmetric.
     NotRound {
-        /// Root mean square of these harmonics over the pressure.
+        /// Root mean square of these harmonics, relative to the pressure.
         harmonics: f64,
     },
 }
@@ -228,18 +230,18 @@ impl fmt::Display for InclusionWarning {
         match self {
             Self::PoorFit { excess } => write!(
                 f,
-                "the best fit leaves {excess:.1} times what the errors explain: several lumps, one \
+                "the misfit is {excess:.1} times what the errors explain: several lumps, one \
                  off the axis, a stiffer skin, or wrong sizes or forces; errors are widened"
             ),
             Self::OneFrame => {
-                f.write_str("one frame tells size and stiffness hardly apart: add approaches")
+                f.write_str("one frame hardly separates size from stiffness: add approaches")
             }
-            Self::NotConverged => f.write_str("the fit had not settled; nothing of it is told"),
+            Self::NotConverged => f.write_str("the fit did not converge; it gives no parameters"),
             Self::UncertainInterface => {
                 f.write_str("bonded and frictionless faces explain the frames about equally well")
             }
             Self::AtBoundary => {
-                f.write_str("the lump touches the surface or the base: beyond the model")
+                f.write_str("the lump touches the surface or the base: the model does not apply")
             }
             Self::AtRim => f.write_str(
                 "part of the lump lies under the rim of the face: press nearer to it for its size",
@@ -247,26 +249,26 @@ impl fmt::Display for InclusionWarning {
             Self::Asymmetric { asymmetry } => write!(
                 f,
                 "the pressure is {:.1} % larger on one side: a lump off the axis, several, or a \
-                 tilted block; the model is symmetric, and no size is given",
+                 tilted block; the model is symmetric, so no size is given",
                 100.0 * asymmetry
             ),
             Self::NotABall { axes } => write!(
                 f,
-                "seen from above the lump's axes are {axes:.2} : 1; the model is a ball, and no \
+                "seen from above the lump's axes are {axes:.2} : 1; the model assumes a ball, so no \
                  size is given"
             ),
             Self::NotRound { harmonics } => write!(
                 f,
                 "around the axis the pressure varies by {:.1} %: a lump that is not round, \
-                 several, or one off the axis; the model is symmetric, and no size is given",
+                 several, or one off the axis; the model is symmetric, so no size is given",
                 100.0 * harmonics
             ),
         }
     }
 }
 
-/// What a symmetric model does not explain of a picture: its first harmonic around the axis above
-/// 3 % and the root mean square of the second to fourth above 0.6 %, both over the pressure.
+/// Warnings about the asymmetric part of a picture: a first harmonic around the axis above 3 %, or
+/// a root mean square of the second to fourth above 0.6 %, both relative to the pressure.
 ///
 /// ```
 /// use tactile_inclusion::asymmetry_warnings;
@@ -299,15 +301,16 @@ pub fn asymmetry_warnings(asymmetry: f64, harmonics: f64) -> Vec<InclusionWarnin
     serde(rename_all = "snake_case")
 )]
 pub enum SearchVerdict {
-    /// One was found.
+    /// An inclusion was found.
     Found,
     /// The frames show none.
     Absent,
-    /// None was found, but one is more probable than not, or the model does not explain the frames.
+    /// No inclusion was found, but one is more probable than not, or the model does not fit the
+    /// frames.
     Uncertain,
 }
 
-/// What a search found.
+/// Result of a search.
 ///
 /// ```no_run
 /// # use tactile_inclusion::InclusionEstimate;
@@ -318,24 +321,24 @@ pub enum SearchVerdict {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct InclusionEstimate {
-    /// Probability that there is an inclusion, one and none being equally likely beforehand.
+    /// Probability that there is an inclusion, with a prior probability of one half.
     pub probability: f64,
-    /// Whether one was found: the probability is above 0.99, χ² falls by more than 36, and its
-    /// modulus is a fifth or more from the tissue's. The block holds it, and χ² over its degrees of
-    /// freedom is below 50.
+    /// Whether an inclusion was found: its probability is above 0.99, χ² falls by more than 36, its
+    /// modulus differs from the tissue's by at least a fifth, it lies within the block, and χ² over
+    /// its degrees of freedom is below 50.
     pub found: bool,
     /// Young's modulus of the tissue, in pascals.
     pub block_modulus_pa: Estimated,
-    /// The inclusion that explains the frames best. `None` where none was found, and where the
-    /// picture is not that of a ball: there is a warning.
+    /// The inclusion that fits the frames best. `None` if none was found, or if the picture is not
+    /// that of a ball, which raises a warning.
     pub inclusion: Option<Inclusion>,
-    /// A second one, where two explain the picture and one does not.
+    /// A second inclusion. `None` unless two inclusions fit the picture and one does not.
     pub second: Option<Inclusion>,
-    /// How the face touches the block.
+    /// Contact condition between face and block.
     pub interface: Interface,
     /// χ² of the fit over its degrees of freedom.
     pub misfit: f64,
-    /// What weakens the estimate.
+    /// Reservations about the estimate.
     pub warnings: Vec<InclusionWarning>,
     /// Radii of the rings used, in metres.
     pub radii_m: Vec<f64>,
@@ -346,13 +349,13 @@ pub struct InclusionEstimate {
 }
 
 impl InclusionEstimate {
-    /// All inclusions of which parameters are given.
+    /// All inclusions whose parameters are reported.
     pub fn inclusions(&self) -> Vec<Inclusion> {
         self.inclusion.into_iter().chain(self.second).collect()
     }
 
-    /// Whether there is an inclusion. That there is none is certain only where the model explains
-    /// the frames: beside a poor fit or one that did not settle it is not.
+    /// Whether there is an inclusion. Its absence is certain only if the model fits the frames;
+    /// after a poor fit, or one that did not converge, it is not.
     pub fn verdict(&self) -> SearchVerdict {
         let is_model_in_doubt = self.warnings.iter().any(|warning| {
             matches!(

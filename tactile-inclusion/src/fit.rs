@@ -4,23 +4,24 @@ use crate::forward::{Forward, Solved};
 use crate::parameters::{Coordinate, LARGEST_POISSON_RATIO, Parameters};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Distance of the optimum in standard errors that the solutions' tolerance may hide.
+/// Distance from the optimum, in standard errors, that may be hidden by the tolerance of the
+/// solutions.
 const UNRESOLVED: f64 = 1.0;
 
-/// Gain of the objective that a fit may still bring over that of its quadratic model: along a
-/// flat valley steps gain more than the model at their start says.
+/// Gain of the objective that a fit may still achieve, relative to its quadratic model. Along a
+/// flat valley, steps gain more than the model predicts at their start.
 const PREDICTED_GAIN: f64 = 4.0;
 
-/// Levenberg's damping at first, over the normal matrix's diagonal.
+/// Initial Levenberg damping, relative to the diagonal of the normal matrix.
 const FIRST_DAMPING: f64 = 1e-3;
 
-/// Its upper bound, beyond which no step lowers the objective.
+/// Upper limit of the damping, above which no step lowers the objective.
 const LARGEST_DAMPING: f64 = 10.0;
 
-/// Its lower bound: of less, steps are Newton's to six digits.
+/// Lower limit of the damping, at which steps equal Newton's to six digits.
 const LEAST_DAMPING: f64 = 1e-6;
 
-/// What is known of a coordinate beforehand: a Gaussian.
+/// Gaussian prior of a coordinate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Prior {
     pub coordinate: Coordinate,
@@ -38,7 +39,7 @@ impl Prior {
     }
 }
 
-/// Measured values with their covariance, and what is known beforehand.
+/// Measured values with their covariance, and the priors.
 #[derive(Clone)]
 pub(crate) struct Problem {
     pub forward: Forward,
@@ -51,35 +52,36 @@ pub(crate) struct Problem {
 #[derive(Debug, Clone)]
 pub(crate) struct Fit {
     pub parameters: Parameters,
-    /// Of the coordinates, in the order of the priors.
+    /// Covariance of the coordinates, in the order of the priors.
     pub covariance: DMatrix<f64>,
     /// rᵀ C⁻¹ r.
     pub misfit: f64,
-    /// The priors' part of the objective.
+    /// Contribution of the priors to the objective.
     pub penalty: f64,
-    /// Logarithm of the evidence by Laplace's approximation, up to what all models share.
+    /// Log-evidence by Laplace's approximation, up to a constant common to all models.
     pub evidence: f64,
-    /// Its part that is the posterior's volume over the prior's.
+    /// Contribution of the posterior's volume relative to the prior's.
     pub volume: f64,
     pub predicted: Vec<f64>,
     pub solved: Solved,
     pub converged: bool,
 }
 
-/// When a fit ends.
+/// Stopping rule of a fit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Ending {
-    /// Distance of the optimum in standard errors below which it has settled. An undamped step that
-    /// gains less than its square is the last.
+    /// Distance from the optimum, in standard errors, below which the fit has converged. An
+    /// undamped step that gains less than its square is the last.
     step: f64,
-    /// Evaluations of the model with its derivatives.
+    /// Maximum number of evaluations of the model with its derivatives.
     evaluations: usize,
-    /// Objective that a fit must reach to be of use: one that is not predicted to ends.
+    /// Objective that a fit must reach to be useful. A fit that is not predicted to reach it is
+    /// stopped.
     needed: f64,
 }
 
 impl Ending {
-    /// This ending for a fit that is of use below an objective alone.
+    /// This stopping rule for a fit that is useful only below an objective.
     pub(crate) fn below(self, objective: f64) -> Self {
         Self {
             needed: objective.min(self.needed),
@@ -88,35 +90,35 @@ impl Ending {
     }
 }
 
-/// Of an answer: what is left is far below what the data tell.
+/// Stopping rule of the final fit: the remaining step is far below the posterior standard error.
 pub(crate) const ANSWER_ENDING: Ending = Ending {
     step: 0.2,
     evaluations: 20,
     needed: f64::INFINITY,
 };
 
-/// Of two inclusions: 0.2 standard errors of each of some 22 coordinates, below which the objective
-/// of moved meshes is rough.
+/// Stopping rule for two inclusions: 0.2 standard errors in each of about 22 coordinates. On moved
+/// meshes the objective is not smooth below this.
 pub(crate) const PAIR_ENDING: Ending = Ending {
     step: 1.0,
     ..ANSWER_ENDING
 };
 
-/// Of the first fits, which a finer mesh moves by more. From a start of the grid, four to eight
-/// evaluations are taken, under the wrong assumption about the face any number.
+/// Stopping rule of the first fits, which a finer mesh changes by more. From a start of the grid
+/// they take four to eight evaluations; under the wrong assumption about the face, any number.
 pub(crate) const FIRST_FIT_ENDING: Ending = Ending {
     step: 0.5,
     evaluations: 12,
     needed: f64::INFINITY,
 };
 
-/// Largest step of a logarithm.
+/// Maximum step of a logarithm.
 const LARGEST_STEP: f64 = 0.5;
 
 /// A change of the coordinates.
 pub(crate) struct FitStep {
     pub by: DVector<f64>,
-    /// In standard errors, before it is cut to [`LARGEST_STEP`].
+    /// Size in standard errors, before the step is limited to [`LARGEST_STEP`].
     pub size: f64,
 }
 
@@ -132,7 +134,7 @@ pub(crate) struct Normal {
     pub solved: Solved,
 }
 
-/// Fixes a coordinate's step in the equations of all.
+/// Fixes the step of one coordinate in the equations of all.
 fn fix(matrix: &mut DMatrix<f64>, gradient: &mut DVector<f64>, k: usize, step: f64) {
     gradient.axpy(-step, &matrix.column(k), 1.0);
     matrix.row_mut(k).fill(0.0);
@@ -142,7 +144,7 @@ fn fix(matrix: &mut DMatrix<f64>, gradient: &mut DVector<f64>, k: usize, step: f
 }
 
 impl Fit {
-    /// −2 ln of the posterior, up to a constant.
+    /// −2 ln of the posterior density, up to a constant.
     pub(crate) fn objective(&self) -> f64 {
         self.misfit + self.penalty
     }
@@ -168,18 +170,18 @@ impl Problem {
         squares.sum()
     }
 
-    /// −2 ln of the posterior, up to a constant.
+    /// −2 ln of the posterior density, up to a constant.
     fn objective(&self, parameters: &Parameters, predicted: &[f64]) -> f64 {
         let misfit = self.whitened(self.residual(predicted)).norm_squared();
         misfit + self.penalty(parameters)
     }
 
-    /// A start with the block's modulus scaled so that the pressures agree on the whole, and how
-    /// far it then is from the measured values. `predicted` are the start's. `None` where they do
-    /// not press.
+    /// A start whose block modulus is scaled so that the pressures agree on average, and its
+    /// distance from the measured values. `predicted` are the pressures of the original start.
+    /// `None` if they are not compressive.
     ///
-    /// Pressures are nearly proportional to the moduli of block and inclusion as long as the guide
-    /// is stiffer than they are.
+    /// Pressures are nearly proportional to the moduli of block and inclusion if the guide is
+    /// stiffer than both.
     pub(crate) fn scaled_start(
         &self,
         start: &Parameters,
@@ -212,7 +214,7 @@ impl Problem {
         self.normal_at(parameters, predicted, solved)
     }
 
-    /// The quadratic model at parameters whose scene is solved.
+    /// The quadratic model at parameters with a solved scene.
     fn normal_at(
         &self,
         parameters: &Parameters,
@@ -244,14 +246,14 @@ impl Problem {
         })
     }
 
-    /// Standard errors of the coordinates at some parameters. `None` where there is no solution.
+    /// Standard errors of the coordinates at given parameters. `None` if there is no solution.
     pub(crate) fn errors(&self, parameters: &Parameters) -> Option<Vec<f64>> {
         let covariance = self.normal(parameters, None)?.matrix.cholesky()?.inverse();
         Some(covariance.diagonal().iter().map(|v| v.sqrt()).collect())
     }
 
-    /// Levenberg–Marquardt from a start. `None` where the start itself has no solution. `go_on` is
-    /// asked before each evaluation.
+    /// Levenberg–Marquardt from a start. `None` if the start has no solution. `go_on` is called
+    /// before each evaluation.
     pub(crate) fn fit(
         &self,
         start: &Parameters,
@@ -263,15 +265,15 @@ impl Problem {
         let mut damping = FIRST_DAMPING;
         let mut evaluations = 1;
         let converged = loop {
-            // How far the quadratic model's optimum is; steps cut short by damping say nothing of
-            // it.
+            // Distance from the optimum of the quadratic model. Steps shortened by damping are no
+            // measure of it.
             let left = self.step(&parameters, &normal, 0.0, None)?.size;
             let reachable = normal.misfit + normal.penalty - PREDICTED_GAIN * left.powi(2);
             if left < ending.step || reachable > ending.needed {
                 break true;
             }
             if damping > LARGEST_DAMPING {
-                // No step lowers the objective: what is left is the solutions' tolerance.
+                // No step lowers the objective, so the rest is the tolerance of the solutions.
                 break left < UNRESOLVED;
             }
             if evaluations == ending.evaluations || !go_on() {
@@ -284,7 +286,7 @@ impl Problem {
             );
             let now = normal.misfit + normal.penalty;
             let found = (self.forward).predict_near(&next, Some(&normal.solved));
-            // Derivatives of a step that is not taken would not be used.
+            // The derivatives of a rejected step are not needed.
             let found = found.filter(|(there, _)| self.objective(&next, there) <= now);
             match found.and_then(|(there, solved)| self.normal_at(&next, there, solved)) {
                 Some(found) => {
@@ -302,8 +304,8 @@ impl Problem {
         self.finished(parameters, normal, converged)
     }
 
-    /// The damped step towards the quadratic model's optimum, that of a coordinate that is held
-    /// left out.
+    /// The damped step towards the optimum of the quadratic model, without a coordinate that is
+    /// held fixed.
     pub(crate) fn step(
         &self,
         parameters: &Parameters,
@@ -322,8 +324,8 @@ impl Problem {
         let mut by = matrix.clone().cholesky()?.solve(&gradient);
         let poisson = |prior: &Prior| prior.coordinate == Coordinate::PoissonRatio;
         if let Some(k) = self.priors.iter().position(poisson) {
-            // A step cut short at the limit of ν alone would not lower the objective: the others'
-            // steps are those that go with ν at its limit.
+            // If only ν were limited, the step would not lower the objective: the steps of the
+            // others must be those for ν at its limit.
             let room = LARGEST_POISSON_RATIO - parameters.poisson_ratio;
             if by[k] > room {
                 fix(&mut matrix, &mut gradient, k, room);
@@ -369,14 +371,14 @@ impl Problem {
         })
     }
 
-    /// Half the logarithm of the errors' covariance's determinant: assumptions about the face
-    /// differ in what the model errs by.
+    /// Half the log-determinant of the error covariance. It is needed because assumptions about the
+    /// face have different model errors.
     fn noise(&self) -> f64 {
         let diagonal = self.factor.l_dirty().diagonal();
         diagonal.iter().map(|d| d.ln()).sum()
     }
 
-    /// Objective that goes with an evidence, for a posterior of this volume.
+    /// The objective that corresponds to an evidence, for a posterior of this volume.
     pub(crate) fn objective_at(&self, evidence: f64, volume: f64) -> f64 {
         2.0 * (volume - self.noise() - evidence)
     }

@@ -1,6 +1,5 @@
-//! How a block's mesh moves with its parameters.
-//!
-//! Interface pressure of a block with an inclusion under a guide, and its derivatives.
+//! The interface pressure of a block with an inclusion under a guide, and its derivatives. The mesh
+//! moves with the parameters.
 
 use crate::parameters::{BLOCK, Coordinate, LumpParameters, Parameters};
 use crate::picture::{Cells, PlainBlock};
@@ -10,13 +9,13 @@ use tactile_fem::{
     Block, FemScene, FrameResponse, Guide, Interface, Kinematics, Lump, Material, SolvedFrames,
 };
 
-/// Largest change of the logarithm of a length by which a mesh is moved.
+/// Maximum change of the logarithm of a length by which a mesh is moved.
 const LARGEST_MESH_CHANGE: f64 = 0.3;
 
-/// How points of the block move: the inclusion as an ellipse whose axes grow, the far side with the
-/// height, linearly in between, the face not at all.
+/// Motion of the points of the block: the inclusion moves as an ellipse with growing axes, the far
+/// side moves with the height, the face does not move, and between them the motion is linear.
 struct MeshMotion {
-    /// The inclusion's half axes across and along the axis. Zero where there is none.
+    /// Half axes of the inclusion across and along the axis. Zero without an inclusion.
     half_axes: [f64; 2],
     /// Depth of the inclusion's centre.
     centre: f64,
@@ -60,7 +59,7 @@ impl MeshMotion {
     fn by_inclusion(&self, [r, z]: [f64; 2]) -> [f64; 2] {
         let offset = z - self.centre;
         let [radius, half_height] = self.half_axes;
-        // In units of the half axes; the ellipse is where their root of squares is one.
+        // In units of the half axes, the ellipse is the unit circle.
         let [across, along] = [r / radius, offset / half_height];
         let distance = across.hypot(along);
         if radius == 0.0 || distance == 0.0 {
@@ -71,7 +70,7 @@ impl MeshMotion {
             return [wider * across, taller * along + self.sunk];
         }
         let [across, along] = [across / distance, along / distance];
-        // The ray from the centre through the point ends at the face, the far side or below the
+        // The ray from the centre through the point ends at the face, at the far side or below the
         // rim.
         let to_face = if along < 0.0 {
             self.centre / (-along * half_height)
@@ -97,36 +96,37 @@ impl MeshMotion {
     }
 }
 
-/// What the mesh depends on: width, height and depth.
+/// The sizes on which the mesh depends: width, height and depth.
 fn sizes(lump: LumpParameters) -> [f64; 3] {
     let [width, height] = lump.axes_m();
     [width, height, lump.depth_m]
 }
 
-/// A block of given size under a guide, and where its pressure is wanted.
+/// A block of given size under a guide, and the positions at which its pressure is evaluated.
 #[derive(Debug, Clone)]
 pub(crate) struct Forward {
     pub guide: Guide,
     pub block_radius_m: f64,
     pub interface: Interface,
-    /// Approaches as read, in metres, growing.
+    /// Approaches as measured, in metres, ascending.
     pub approaches_m: Vec<f64>,
-    /// Where each frame's pressure is wanted, in metres from the axis.
+    /// Radii at which the pressure of each frame is evaluated, in metres.
     pub radii_m: Vec<f64>,
-    /// The same of a whole face, where these radii are its cells'.
+    /// Data of a whole face, if the radii are those of its cells.
     pub cells: Option<Cells>,
     /// Elements along an eighth of the inclusion's circumference.
     pub fineness: usize,
-    /// Small strain is solved in one iteration: good enough to sort starts.
+    /// Kinematics. Small strain is solved in one iteration, which is accurate enough to rank
+    /// starts.
     pub kinematics: Kinematics,
 }
 
-/// A solved scene, from which scenes nearby are solved in fewer iterations.
+/// A solved scene, from which nearby scenes are solved in fewer iterations.
 #[derive(Debug, Clone)]
 pub(crate) struct Solved {
     meshed: Arc<Meshed>,
     frames: SolvedFrames,
-    /// With the second inclusion in place of the first, where there are two.
+    /// The scene with the second inclusion in place of the first. `None` for a single inclusion.
     second: Option<Box<Solved>>,
 }
 
@@ -139,8 +139,8 @@ impl Solved {
 
 /// A scene as it was meshed, before its mesh is moved to other parameters or along the interface.
 ///
-/// The number of elements depends on the parameters in jumps, and with it the mesh's error: a fit
-/// compares solutions on one mesh, moved.
+/// The number of elements, and with it the mesh error, depends on the parameters in jumps. A fit
+/// therefore compares solutions on one moved mesh.
 #[derive(Debug, Clone)]
 struct Meshed {
     scene: FemScene,
@@ -148,7 +148,7 @@ struct Meshed {
 }
 
 impl Meshed {
-    /// Whether its mesh still has good elements where it is moved to these parameters.
+    /// Whether the elements are still well shaped if the mesh is moved to these parameters.
     fn reaches(&self, parameters: &Parameters) -> bool {
         let lumps = match (self.parameters.lump, parameters.lump) {
             (None, None) => true,
@@ -162,7 +162,8 @@ impl Meshed {
     }
 }
 
-/// Depth down to which a sliding face moves the block's mesh: the inclusion's stays where it is.
+/// Depth to which a sliding face moves the mesh of the block. The mesh of the inclusion does not
+/// move.
 fn sliding_depth(parameters: &Parameters) -> f64 {
     (parameters.lump).map_or(0.4 * parameters.height_m, |lump| lump.depth_m)
 }
@@ -176,15 +177,15 @@ impl Forward {
         self.approaches_m.len() * (self.radii_m.len() + 1)
     }
 
-    /// Whether the mesh follows the face's sliding.
+    /// Whether the mesh follows the sliding of the face.
     fn slides(&self) -> bool {
         self.interface == Interface::Frictionless && self.kinematics == Kinematics::Finite
     }
 
-    /// The block under the guide at some parameters.
+    /// The block under the guide for given parameters.
     ///
     /// # Errors
-    /// A lump that the block does not hold, or one too small to be meshed.
+    /// An error for a lump outside the block, or too small to be meshed.
     pub(crate) fn scene(&self, parameters: &Parameters) -> Result<FemScene, ElasticityError> {
         let material = |modulus| Material::new(modulus, parameters.poisson_ratio);
         let lump = match parameters.lump {
@@ -211,12 +212,13 @@ impl Forward {
         )
     }
 
-    /// The frames' pressures and forces. `None` where the block cannot be meshed or solved.
+    /// Pressures and forces of the frames. `None` if the block cannot be meshed or solved.
     pub(crate) fn predict(&self, parameters: &Parameters) -> Option<Vec<f64>> {
         Some(self.predict_near(parameters, None)?.0)
     }
 
-    /// As [`Self::predict`], from a scene solved nearby. And this one, solved.
+    /// Like [`Self::predict`], starting from a nearby solved scene. Also returns the new solved
+    /// scene.
     pub(crate) fn predict_near(
         &self,
         parameters: &Parameters,
@@ -231,8 +233,8 @@ impl Forward {
         Some((prediction, solved))
     }
 
-    /// The pressures and forces of a block solved with its inclusions under the axis, at the places
-    /// that `parameters` have for them.
+    /// Pressures and forces of a block that was solved with its inclusions on the axis, with the
+    /// inclusions at the positions in `parameters`.
     pub(crate) fn of_solved(&self, parameters: &Parameters, solved: &Solved) -> Vec<f64> {
         let states = solved.frames.states();
         let of_second = (solved.second.as_ref()).map_or(states, |second| second.frames.states());
@@ -244,7 +246,7 @@ impl Forward {
         )
     }
 
-    /// The block with the first inclusion under the axis, from a scene solved nearby.
+    /// Solves the block with the first inclusion on the axis, starting from a nearby solved scene.
     fn solve_near(&self, parameters: &Parameters, near: Option<&Solved>) -> Option<Solved> {
         let meshed = match near {
             Some(near) if near.meshed.reaches(parameters) => Arc::clone(&near.meshed),
@@ -270,8 +272,8 @@ impl Forward {
         })
     }
 
-    /// This forward model with the plain block that carries the pressure of one with an inclusion
-    /// to the cells of a face. `None` where that cannot be solved.
+    /// Adds the plain block, with which the pressure of a block with an inclusion is transferred to
+    /// the cells of a face. `None` if the plain block cannot be solved.
     pub(crate) fn with_plain(mut self, parameters: &Parameters) -> Option<Self> {
         let plain = Parameters {
             lump: None,
@@ -296,12 +298,12 @@ impl Forward {
         Some(self)
     }
 
-    /// How much an inclusion lifts the pressure above it, relative.
+    /// Relative increase of the pressure above an inclusion.
     pub(crate) fn lift(&self, solved: &Solved) -> f64 {
         (self.cells.as_ref()).map_or(0.0, |cells| cells.lift(&solved.frames))
     }
 
-    /// The scene of parameters near those of `scene`, on its mesh.
+    /// The scene for parameters near those of `scene`, on its mesh.
     fn changed(&self, scene: &FemScene, from: &Parameters, to: &Parameters) -> Option<FemScene> {
         let tissue = self.guide.layers().len();
         let material = |modulus| Material::new(modulus, to.poisson_ratio).ok();
@@ -317,8 +319,8 @@ impl Forward {
         scene.changed(&materials, moved).ok()
     }
 
-    /// Values of frames, given by their pressures over the radius, with each inclusion under the
-    /// axis, and their forces.
+    /// Values of frames from their radial pressure profiles, with each inclusion on the axis, and
+    /// from their forces.
     fn collect(
         &self,
         parameters: &Parameters,
@@ -342,7 +344,7 @@ impl Forward {
         values
     }
 
-    /// What is found of a solved scene after a small step of each coordinate, and without one.
+    /// Response of a solved scene to a small step of each coordinate, and to none.
     fn responses(
         &self,
         parameters: &Parameters,
@@ -363,12 +365,12 @@ impl Forward {
         solved.frames.responses(changed, approaches)
     }
 
-    /// The derivatives of a solved scene's prediction, one column a coordinate.
+    /// The derivatives of a solved scene's prediction, one column per coordinate.
     ///
-    /// A derivative is the difference of one iteration on the slightly changed block and one on the
-    /// block itself, both from the solution with its tangent. It takes one factorisation a frame
-    /// and one residual for each coordinate and frame. The iteration on the block itself takes out
-    /// what the solution leaves unbalanced.
+    /// A derivative is the difference between one iteration on the slightly changed block and one
+    /// on the unchanged block, both from the solution with its tangent. It needs one factorisation
+    /// per frame, and one residual per coordinate and frame. The iteration on the unchanged block
+    /// cancels the residual imbalance of the solution.
     pub(crate) fn derivatives(
         &self,
         parameters: &Parameters,
@@ -396,7 +398,7 @@ impl Forward {
         } else {
             (vec![], vec![])
         };
-        // What is found after a step of a coordinate, or without one.
+        // The response to a step of a coordinate, or to none.
         let found = |named: &[Coordinate], c: Option<Coordinate>| {
             c.and_then(|c| named.iter().position(|named| *named == c))
                 .unwrap_or(named.len())

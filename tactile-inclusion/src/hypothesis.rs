@@ -1,18 +1,18 @@
-//! What the fits under one assumption about the face say.
+//! The fits under one assumption about the face, and a test for a plain block before an inclusion
+//! is fitted.
 //!
-//! Whether a block can be plain, before an inclusion is fitted.
-//!
-//! Rao's score test: let r be the residual of the homogeneous block, J its derivatives, C and P the
-//! covariances of errors and prior, and s what a given inclusion would add to the pressures, the
-//! fall of the objective by a multiple of s, the homogeneous block's parameters fitted along, is
+//! The test is Rao's score test. Let r be the residual of the homogeneous block, J its derivatives,
+//! C and P the covariances of errors and prior, and s the contribution of a given inclusion to the
+//! pressures. A multiple of s, with the parameters of the homogeneous block fitted at the same
+//! time, lowers the objective by
 //!
 //! $$ \frac{(s^T Q r)^2}{s^T Q s}, \qquad Q = C^{-1} - C^{-1} J (J^T C^{-1} J + P^{-1})^{-1} J^T
 //! C^{-1} $$
 //!
-//! and the odds of just that inclusion against none are $\exp(s^T Q r - \tfrac{1}{2} s^T Q s)$ (C.
-//! R. Rao, Proc. Cambridge Philos. Soc. 44 (1948) 50). What is added is that of small strain on a
-//! coarse mesh, the same with and without the inclusion's modulus: its size is right within some
-//! ten percent.
+//! and the odds of this inclusion against none are $\exp(s^T Q r - \tfrac{1}{2} s^T Q s)$ (C. R.
+//! Rao, Proc. Cambridge Philos. Soc. 44 (1948) 50). The contribution is computed in small strain on
+//! a coarse mesh, with and without the inclusion's modulus on the same mesh. Its size is accurate
+//! to a few tens of per cent.
 
 use crate::covariance::Observed;
 use crate::estimate::{
@@ -25,52 +25,53 @@ use crate::starts::GridStart;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
 use tactile_fem::Interface;
 
-/// Standard deviations by which χ² may exceed its mean: above, 1 chance in 1000, a fit counts as
-/// poor.
+/// A fit is poor if χ² exceeds its mean by more than this number of standard deviations, which
+/// happens by chance once in 1000.
 const POOR: f64 = 3.1;
 
-/// Least contrast either way, E₁/E₀ or E₀/E₁: an inclusion nearer to the tissue explains no more
-/// than what its mesh differs by from a homogeneous block's (a contrast of 1.02 to 1.04 in
-/// homogeneous blocks by CalculiX).
+/// Minimum contrast, E₁/E₀ or E₀/E₁. An inclusion with a modulus closer to the tissue's explains no
+/// more than the mesh difference to a homogeneous block (a contrast of 1.02 to 1.04 in homogeneous
+/// blocks by CalculiX).
 const LEAST_CONTRAST: f64 = 1.2;
 
-/// Least probability for that.
+/// Minimum probability of a found inclusion.
 const LEAST_PROBABILITY: f64 = 0.99;
 
-/// Least fall of χ² for an inclusion to count as found, that of six standard errors: what finite
-/// elements err by brings it to 25 in one of 38 homogeneous blocks by CalculiX, 161 of 162
-/// inclusions there to 60 or more and the last, hardly to be found, to 33 (`inclusion_study`).
+/// Minimum fall of χ² for a found inclusion: six standard errors. Errors of the finite elements
+/// bring it to 25 in one of 38 homogeneous blocks by CalculiX. It is 60 or more for 161 of 162
+/// inclusions there, and 33 for the last, which is barely detectable (`inclusion_study`).
 const LEAST_FALL: f64 = 36.0;
 
-/// χ² over its degrees of freedom above which the model is not that of the block pressed, and a
-/// lump in it explains nothing. One that touches the surface brings it to some ten.
+/// χ² over its degrees of freedom above which the model does not describe the block, so that a lump
+/// in it explains nothing. For a lump that touches the surface it is about ten.
 const LARGEST_MISFIT: f64 = 50.0;
 
-/// That of χ² with two degrees of freedom.
+/// Corresponding limit of χ² with two degrees of freedom.
 const LARGEST: f64 = 13.8;
 
-/// Fall of the objective that a grid's inclusion must be predicted to bring for inclusions to be
-/// fitted. One that is found lowers χ² by 36; its neighbour in the grid brings half of that or
-/// more.
+/// Minimum predicted fall of the objective, for an inclusion of the grid, at which inclusions are
+/// fitted. A found inclusion lowers χ² by 36; its neighbour in the grid achieves at least half of
+/// that.
 const LEAST_PROMISE: f64 = 18.0;
 
-/// Fall of the objective without which an inclusion is not that probable, 2 ln(p / (1 − p)). The
-/// parameters it adds are known better afterwards than before, which lowers the evidence further.
+/// Minimum fall of the objective for an inclusion of this probability, 2 ln(p / (1 − p)). Its
+/// additional parameters lower the evidence further, because the posterior is narrower than the
+/// prior.
 pub(crate) const LEAST_GAIN: f64 = 9.2;
 
-/// Whether a fit leaves more than the errors explain.
+/// Whether a fit leaves residuals above the errors.
 pub(crate) fn is_poor(misfit: f64, observed: &Observed) -> bool {
     let freedom = observed.values.len() as f64;
     misfit > freedom + POOR * (2.0 * freedom).sqrt()
 }
 
-/// The fit with more evidence, of one without an inclusion and one with it.
+/// The fit with the higher evidence, without or with an inclusion.
 pub(crate) fn better<'a>(homogeneous: &'a Fit, lump: Option<&'a Fit>) -> &'a Fit {
     lump.filter(|lump| lump.evidence > homogeneous.evidence)
         .unwrap_or(homogeneous)
 }
 
-/// Number of coordinates of the block. They stand first, and ln D, ln d and ln E₁ follow.
+/// Number of coordinates of the block. They come first; ln D, ln d and ln E₁ follow.
 pub(crate) const BLOCK_COORDINATES: usize = 4;
 
 /// The best fits under one assumption about the face.
@@ -78,15 +79,15 @@ pub(crate) struct Hypothesis {
     pub problem: Problem,
     pub interface: Interface,
     pub homogeneous: Fit,
-    /// What inclusions are predicted to bring, where none was fitted.
+    /// Predicted contributions of inclusions. `None` if one was fitted.
     pub score: Option<Score>,
     pub lump: Option<Fit>,
-    /// Posteriors of the fit with an inclusion, once its ridge is followed.
+    /// Posterior distributions of the fit with an inclusion, once its ridge has been followed.
     pub marginal: Option<Marginal>,
 }
 
 impl Hypothesis {
-    /// Follows the ridge of the fit with an inclusion, where there is more for one than against.
+    /// Follows the ridge of the fit with an inclusion, if the evidence favours one.
     pub(crate) fn follow(&mut self, go_on: impl FnMut() -> bool) {
         if let Some(fit) = self
             .lump
@@ -105,18 +106,18 @@ impl Hypothesis {
         self.homogeneous.evidence.max(self.evidence_with())
     }
 
-    /// The fit with more evidence.
+    /// The fit with the higher evidence.
     pub(crate) fn better(&self) -> &Fit {
         better(&self.homogeneous, self.lump.as_ref())
     }
 
-    /// χ² over its degrees of freedom, where that is more than one: what differences of log
-    /// evidence are too large by.
+    /// χ² over its degrees of freedom, but at least one: the factor by which differences of
+    /// log-evidence are too large.
     pub(crate) fn inflation(&self, observed: &Observed) -> f64 {
         (self.better().misfit / observed.values.len() as f64).max(1.0)
     }
 
-    /// Log evidence with an inclusion: that of the grid where none was fitted.
+    /// Log-evidence with an inclusion. If none was fitted, it is that of the grid.
     fn evidence_with(&self) -> f64 {
         match (&self.lump, &self.score) {
             (Some(fit), _) => fit.evidence + self.marginal.as_ref().map_or(0.0, |m| m.gain),
@@ -125,7 +126,7 @@ impl Hypothesis {
         }
     }
 
-    /// Logarithm of the odds that there is an inclusion, whichever way the face touches.
+    /// Log-odds of an inclusion, over both contact conditions.
     fn log_odds(&self, rival: Option<&Self>) -> f64 {
         let both = || [self].into_iter().chain(rival);
         let with = both().map(Self::evidence_with);
@@ -133,7 +134,7 @@ impl Hypothesis {
         with.fold(f64::NEG_INFINITY, f64::max) - without.fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// The fit with an inclusion, where it counts as found at these odds.
+    /// The fit with an inclusion, if it counts as found at these odds.
     fn found(&self, log_odds: f64) -> Option<&Fit> {
         let values = self.problem.measured.len() as f64;
         self.lump.as_ref().filter(|fit| {
@@ -149,10 +150,11 @@ impl Hypothesis {
         })
     }
 
-    /// Value and 95 % interval of a coordinate, errors widened by a factor.
+    /// Value and 95 % interval of a coordinate, with errors widened by a factor.
     ///
-    /// Of a skewed posterior the optimum lies at an end of the interval: D and d are its medians.
-    /// E₁'s upper tail is the prior's, and so would be its median: the optimum depends on it less.
+    /// The optimum of a skewed posterior lies at one end of the interval, so D and d are medians.
+    /// For E₁ the upper tail comes from the prior, and so would the median: the optimum depends on
+    /// it less.
     fn posterior(&self, fit: &Fit, coordinate: Coordinate, widened: f64) -> (f64, [f64; 2]) {
         let is_modulus = coordinate == Coordinate::LumpModulus;
         let mut best = fit.parameters.get(coordinate);
@@ -176,13 +178,13 @@ impl Hypothesis {
         (at, [at - widened * down, at + widened * up])
     }
 
-    /// Whether an inclusion's outline is not round, but for 1 chance in 1000.
+    /// Whether the outline of an inclusion is not round, at a significance of 0.001.
     fn is_elongated(&self, fit: &Fit) -> bool {
         let Some(first) = self.index(Coordinate::Elongation(0)) else {
             return false;
         };
-        // Standard error of the elongation that a ball off the axis shows: 0.02 in solutions in
-        // three dimensions.
+        // Standard error of the elongation that an off-axis ball appears to have: 0.02 in solutions
+        // in three dimensions.
         let of_model = Matrix2::identity() * 0.02_f64.powi(2);
         let covariance = fit.covariance.fixed_view::<2, 2>(first, first) + of_model;
         let elongation = Vector2::from(fit.parameters.place.elongation);
@@ -190,8 +192,8 @@ impl Hypothesis {
         inverse.is_some_and(|inverse| elongation.dot(&(inverse * elongation)) > LARGEST)
     }
 
-    /// Whether a sixth of an inclusion lies beyond the used part of every press's face. Two presses
-    /// with its middle under their used parts show it from two sides.
+    /// Whether a sixth of an inclusion lies outside the used part of the face in every press. Two
+    /// presses whose used parts cover its centre show it from two sides.
     fn is_at_rim(&self, parameters: &Parameters) -> bool {
         let (Some(lump), Some(cells)) = (parameters.lump, &self.problem.forward.cells) else {
             return false;
@@ -203,13 +205,13 @@ impl Hypothesis {
         asides.iter().all(is_cut) && asides.iter().filter(|a| **a < cells.reach_m).count() < 2
     }
 
-    /// Where a coordinate stands among those fitted.
+    /// Index of a coordinate among those fitted.
     fn index(&self, coordinate: Coordinate) -> Option<usize> {
         let mut priors = self.problem.priors.iter();
         priors.position(|prior| prior.coordinate == coordinate)
     }
 
-    /// How far a coordinate is at a fit from where it would be, were the inclusion a ball.
+    /// Change of a coordinate from the fit to the fit with a ball.
     fn step_to_ball(&self, fit: &Fit, coordinate: usize) -> f64 {
         let away = self.index(Coordinate::Aspect).map(|shape| {
             let c = &fit.covariance;
@@ -231,8 +233,8 @@ impl Hypothesis {
         })
     }
 
-    /// The answer. `rival` explains the frames about as well, `is_unsolved` that one could not be
-    /// solved which may have.
+    /// The result. `rival` fits the frames about equally well; `is_unsolved` means that a possible
+    /// rival could not be solved.
     pub(crate) fn estimate(
         self,
         observed: &Observed,
@@ -334,31 +336,31 @@ impl Hypothesis {
     }
 }
 
-/// Standard error of the place of an inclusion under the rim, over the radius of the face: the law
-/// of the load's spread was not fitted there. A block solved in three dimensions is told half a
-/// millimetre too near to the axis on a face of 16 mm radius.
+/// Standard error of the position of an inclusion under the rim, relative to the radius of the
+/// face: the law of the load's spread was not fitted there. In a block solved in three dimensions
+/// the estimate is half a millimetre too close to the axis, on a face of 16 mm radius.
 const PLACE_AT_RIM: f64 = 0.03;
 
 fn probability(log_odds: f64) -> f64 {
     1.0 / (1.0 + (-log_odds).exp())
 }
 
-/// The least interval that holds two.
+/// The smallest interval that contains both.
 fn hull(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
 
-/// A homogeneous fit and its derivatives, to weigh changes of its pressures by.
+/// A homogeneous fit with its derivatives, to assess changes of its pressures.
 pub(crate) struct PlainFit {
     predicted: Vec<f64>,
-    /// Whitened derivatives by the block's parameters.
+    /// Whitened derivatives with respect to the block's parameters.
     columns: DMatrix<f64>,
     gradient: DVector<f64>,
     precision: Cholesky<f64, Dyn>,
 }
 
 impl PlainFit {
-    /// `None` where the fit has no derivatives.
+    /// `None` if the fit has no derivatives.
     pub(crate) fn new(problem: &Problem, fit: &Fit) -> Option<Self> {
         let normal = problem.normal(&fit.parameters, Some(&fit.solved))?;
         Some(Self {
@@ -369,7 +371,7 @@ impl PlainFit {
         })
     }
 
-    /// The whitened change of the values by relative changes.
+    /// The whitened change of the values for relative changes.
     pub(crate) fn added(&self, problem: &Problem, relative: &[f64]) -> DVector<f64> {
         let added = relative
             .iter()
@@ -378,29 +380,29 @@ impl PlainFit {
         problem.whitened(DVector::from_iterator(self.predicted.len(), added))
     }
 
-    /// Fall of χ² by a whitened change where it is there, less what the block's own parameters take
-    /// up of it: sᵀ Q s.
+    /// Fall of χ² by a whitened change that is present, minus the part that the parameters of the
+    /// block absorb: sᵀ Q s.
     pub(crate) fn gain(&self, added: &DVector<f64>) -> f64 {
         let shared = self.columns.tr_mul(added);
         added.norm_squared() - shared.dot(&self.precision.solve(&shared))
     }
 }
 
-/// What a grid of inclusions would change of a homogeneous fit.
+/// Effect of a grid of inclusions on a homogeneous fit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Score {
     /// Largest fall of the objective.
     pub predicted_gain: f64,
-    /// Logarithm of the odds of an inclusion, those of the grid being equally likely.
+    /// Log-odds of an inclusion, with equal priors on the grid.
     log_odds: f64,
 }
 
 impl Score {
-    /// Of a fit without inclusion. `None` where it has no derivatives.
+    /// Computes the score of a fit without inclusion. `None` if the fit has no derivatives.
     pub(crate) fn new(problem: &Problem, homogeneous: &Fit, grid: &[GridStart]) -> Option<Self> {
         let plain = PlainFit::new(problem, homogeneous)?;
         let residual = problem.whitened(problem.residual(&plain.predicted));
-        // What the homogeneous block's own parameters cannot take up.
+        // The part that the parameters of the homogeneous block cannot absorb.
         let left = &residual - &plain.columns * plain.precision.solve(&plain.gradient);
         let mut odds = Vec::new();
         let mut predicted_gain = 0.0f64;

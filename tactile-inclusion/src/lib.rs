@@ -1,26 +1,26 @@
 #![doc = include_str!("../README.md")]
 //!
 //! # Method
-//! The unknowns are the diameter D, the depth d of the top, the inclusion's modulus E₁ and the
-//! block's E₀. The block's height, Poisson's ratio and the zero of the approaches are known with
-//! errors. The model is [`FemScene::block_under_guide`](tactile_fem::FemScene::block_under_guide)
-//! at finite strain: size and stiffness differ in how the pressure grows with the approach, which
-//! linear elasticity hardly shows.
+//! The unknowns are the diameter D, the depth d of the top, the modulus E₁ of the inclusion and the
+//! modulus E₀ of the block. The block's height, Poisson's ratio and the zero of the approaches have
+//! priors. The model is [`FemScene::block_under_guide`](tactile_fem::FemScene::block_under_guide)
+//! at finite strain: size and stiffness differ in the growth of the pressure with the approach,
+//! which linear elasticity hardly shows.
 //!
-//! With y the measured ring means and forces, m(φ) the model's, C the covariance of the sensor's
-//! and the model's errors and a Gaussian prior of mean φ₀ and covariance P,
+//! Let y be the measured ring means and forces, m(φ) those of the model, and C the covariance of
+//! the errors of sensor and model. With a Gaussian prior of mean φ₀ and covariance P,
 //!
 //! $$ -2 \ln p(\varphi | y) = (y - m)^T C^{-1} (y - m) + (\varphi - \varphi_0)^T P^{-1} (\varphi -
 //! \varphi_0) + c $$
 //!
-//! is minimised over φ = (ln E₀, zero, ln H, ν, ln D, ln d, ln E₁). Its second derivative there
-//! gives errors and correlations, its determinant the evidence (Laplace). The ratio of the evidence
-//! with and without inclusion is the odds that there is one.
+//! is minimised over φ = (ln E₀, zero, ln H, ν, ln D, ln d, ln E₁). Its second derivative at the
+//! minimum gives errors and correlations, and the determinant gives the evidence (Laplace). The
+//! ratio of the evidence with and without an inclusion gives the odds of an inclusion.
 //!
-//! The posterior is far from Gaussian: beyond some contrast a stiffer inclusion changes the
-//! pressure no more. A small stiff one is hardly different from a large one that is little stiffer
-//! than the tissue. The intervals of D, d and E₁ therefore follow the posterior along ln E₁. Where
-//! bonded and frictionless faces explain the frames about equally well the intervals hold those of
+//! The posterior is far from Gaussian: above some contrast, a stiffer inclusion no longer changes
+//! the pressure. A small stiff inclusion is hardly different from a large one that is slightly
+//! stiffer than the tissue. The intervals of D, d and E₁ therefore follow the posterior along ln
+//! E₁. If bonded and frictionless faces fit the frames about equally well, the intervals cover
 //! both.
 //!
 //! # References

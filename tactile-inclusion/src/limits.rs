@@ -1,4 +1,4 @@
-//! How small an inclusion can be and still be found, place by place.
+//! The smallest inclusion that can be found at each position.
 
 use crate::forward::{Forward, Solved};
 use crate::hypothesis::PlainFit;
@@ -10,33 +10,35 @@ use core::ops::ControlFlow;
 use tactile_core::Progress;
 use tactile_elasticity::{ElasticityError, Quantity};
 
-/// Diameters over the face's radius that are solved. Smaller ones count as large as the first.
+/// Diameters that are solved, relative to the face radius. Smaller ones are treated as the first.
 const DIAMETERS: [f64; 6] = [0.09, 0.15, 0.25, 0.4, 0.65, 1.05];
 
-/// Part of the block's height that an inclusion may reach down to.
+/// Fraction of the block's height to which an inclusion may extend.
 const DEEPEST: f64 = 0.95;
 
-/// Expected fall of χ² by an inclusion that 95 of 100 searches find. Half of the searches found
-/// balls that lower it by 58, 58 and 78, at three places with 16 draws of the noise for each of
-/// five diameters. At 110 19, 19 and 16 of 20 found them; the last ball was small and shallow, and
-/// 20 of 20 found it at 150. Less promises too much there, more calls larger balls hidden.
+/// Expected fall of χ² for an inclusion that 95 of 100 searches find. Half of the searches found
+/// balls that lower it by 58, 58 and 78, at three positions with 16 draws of the noise for each of
+/// five diameters. At 110, 19, 19 and 16 of 20 searches found them; the last ball was small and
+/// shallow, and 20 of 20 found it at 150. A smaller limit promises too much there; a larger one
+/// declares larger balls undetectable.
 const FOUND_GAIN: f64 = 150.0;
 
 impl InclusionSearch {
-    /// Least diameters of a ball that a scan shows, in metres: for each depth of its top, one for
-    /// each place (x, y) of its middle. Infinite where no ball up to the face's radius shows, or
-    /// none is searched.
+    /// Minimum diameters of a ball that a scan detects, in metres: for each depth of its top, one
+    /// value per position (x, y) of its centre. Infinite if no ball up to the radius of the face is
+    /// detected, or if the position is not searched.
     ///
-    /// A ball `contrast` times as stiff as the block adds s to the pressures of a plain block. With
-    /// the covariance C of the errors, and J and P those of the block's parameters, it lowers χ² by
+    /// A ball `contrast` times as stiff as the block adds s to the pressures of a plain block. Let
+    /// C be the covariance of the errors, and J and P the derivatives and the prior covariance of
+    /// the block's parameters. The ball lowers χ² by
     ///
     /// $$ s^T Q s, \qquad Q = C^{-1} - C^{-1} J (J^T C^{-1} J + P^{-1})^{-1} J^T C^{-1} $$
     ///
-    /// The least diameter is where this is 150, from which 95 of 100 searches or more find it. The
-    /// block is plain but for this ball: beside an inclusion that is there less is found. Errors
-    /// and the block's modulus are those of the scan's frames. The face counts as bonded unless the
-    /// specimen says otherwise. s is that of small strain, its size right within some ten per cent,
-    /// and the diameter within some three.
+    /// The minimum diameter is that at which this is 150, where at least 95 of 100 searches find
+    /// it. The block is assumed plain except for this ball: next to another inclusion, sensitivity
+    /// is lower. Errors and the block's modulus are those of the scan's frames. The face is assumed
+    /// bonded unless the specimen specifies its interface. s is computed in small strain, with an
+    /// accuracy of about ten per cent, which is about three per cent of the diameter.
     ///
     /// ```no_run
     /// use core::ops::ControlFlow;
@@ -56,8 +58,8 @@ impl InclusionSearch {
     /// ```
     ///
     /// # Errors
-    /// Those of [`Self::search_scan`]. A contrast or a depth that is not positive. A place that is
-    /// not finite.
+    /// Those of [`Self::search_scan`], and errors for a contrast or depth that is not positive and
+    /// for a position that is not finite.
     pub fn detection_limits(
         &self,
         scan: &Scan,
@@ -120,11 +122,12 @@ impl InclusionSearch {
         Ok(limits)
     }
 
-    /// The one of `candidates_m` where the next press of a scan would search most: under the used
-    /// part of its face the mean volume of the balls that could hide is the largest. `limits_m` are
-    /// [`Self::detection_limits`] at `places_m`. Where nothing is searched yet, a ball as wide as
-    /// the face's radius could hide. Of candidates that are as good the one nearest to the scan's
-    /// presses. `None` without a candidate that has places under its face.
+    /// The candidate of `candidates_m` where the next press of a scan searches most: the mean
+    /// volume of the balls that could be hidden under the used part of its face is largest there.
+    /// `limits_m` are [`Self::detection_limits`] at `places_m`. In unsearched regions a ball as
+    /// wide as the face's radius could be hidden. Among equally good candidates, the one nearest to
+    /// the presses of the scan is chosen. `None` if no candidate has any of these positions under
+    /// its face.
     pub fn next_position(
         &self,
         scan: &Scan,
@@ -152,7 +155,7 @@ impl InclusionSearch {
             (count > 0).then_some((sum / f64::from(count), nearest, candidate))
         });
         let best = found.reduce(|best, other| {
-            // Equal shares of places differ by rounding.
+            // Equal fractions of positions differ by rounding.
             let is_better = other.0 > best.0 + 1e-9;
             let is_as_good_and_nearer = other.0 > best.0 - 1e-9 && other.1 < best.1;
             if is_better || is_as_good_and_nearer {
@@ -165,7 +168,7 @@ impl InclusionSearch {
     }
 }
 
-/// A ball under the axis, and the same mesh with the block's modulus in its place.
+/// A ball on the axis, and the same mesh with the modulus of the block in its place.
 struct Ball {
     parameters: Parameters,
     with: Solved,
@@ -173,7 +176,7 @@ struct Ball {
 }
 
 impl Ball {
-    /// `None` where it could not be solved.
+    /// `None` if it could not be solved.
     fn new(
         block: &HomogeneousFit,
         lump: LumpParameters,
@@ -205,7 +208,8 @@ impl Ball {
         self.parameters.lump.map_or(0.0, |lump| lump.diameter_m)
     }
 
-    /// Part by which each value is more than a plain block's, with the ball's middle at a place.
+    /// Relative excess of each value over that of a plain block, with the centre of the ball at a
+    /// given position.
     fn added(&self, linear: &Forward, centre_m: [f64; 2]) -> Vec<f64> {
         let mut parameters = self.parameters.clone();
         parameters.place.centre_m = centre_m;
@@ -216,8 +220,8 @@ impl Ball {
     }
 }
 
-/// The diameter from which χ² falls by enough, from falls at growing diameters. They grow nearly as
-/// a power of the diameter, and are computed up to the first that is enough.
+/// The diameter at which the fall of χ² is sufficient, from falls at increasing diameters. They are
+/// nearly a power of the diameter, and are computed up to the first that is sufficient.
 fn least_found(gains: impl Iterator<Item = (f64, f64)>) -> f64 {
     let mut before = None;
     for (diameter, gain) in gains {

@@ -1,11 +1,11 @@
-//! Two inclusions where one does not explain the pressure.
+//! Two inclusions, if one does not explain the pressure.
 //!
-//! The pressure is that of a plain block times the ratios of both,
+//! The pressure is that of a plain block times the ratios of both inclusions,
 //!
 //! $$ p = p_\mathrm{plain} \prod_k \frac{p_k}{p_\mathrm{plain}} $$
 //!
-//! in which each p_k has its lump under the axis and is laid around its place. The parameters of
-//! both are fitted together.
+//! where each p_k is computed with its lump on the axis and then moved to its position. The
+//! parameters of both are fitted together.
 
 use crate::covariance::{Observed, Resolution};
 use crate::estimate::InclusionEstimate;
@@ -20,36 +20,38 @@ use crate::starts::{DEPTHS, DIAMETERS};
 use nalgebra::DVector;
 use tactile_fem::Kinematics;
 
-/// Log evidence by which two must exceed one: far more than what ellipsoids and the model's own
-/// error bring.
+/// Minimum difference of log-evidence between two inclusions and one: far above the effect of
+/// ellipsoids and of the model error.
 const LEAST_GAIN: f64 = 100.0;
 
-/// Modulus of a trial inclusion over that around it, from which logarithms of pressures are scaled.
+/// Modulus of a trial inclusion relative to its surroundings. The logarithms of the pressures are
+/// scaled from it.
 const CONTRAST: f64 = 8.0;
 
-/// Multiples of an inclusion's logarithm that a contrast can bring.
+/// Possible multiples of an inclusion's logarithm, over all contrasts.
 const POSSIBLE: core::ops::Range<f64> = 0.15..2.5;
 
-/// Fineness of the meshes of the map of places, in small strain.
+/// Fineness of the meshes for the map of positions, in small strain.
 const FINENESS: usize = 2;
 
-/// Error of the product of ratios, over the pressure, where two shallow inclusions touch of which
-/// each doubles it. It falls with their distance, and grows with the root of the product of what
-/// they add, and with their depth over their distance ([`side_by_side`]).
+/// Relative error of the product of ratios for two touching shallow inclusions that each double the
+/// pressure. It decreases with their distance, and increases with the root of the product of their
+/// contributions and with their depth over their distance ([`side_by_side`]).
 const NEIGHBOURS: f64 = 0.03;
 
-/// How far tissue that flows away from the axis carries an inclusion beside another.
+/// Displacement of an inclusion by tissue that flows away from the axis, next to another inclusion.
 const CARRIED: Coordinate = Coordinate::Carried;
 
-/// Its standard error: two inclusions hold the tissue between them back, and come half as far in
-/// solutions in three dimensions.
+/// Standard error of the displacement: two inclusions hold back the tissue between them and move
+/// half as far, in solutions in three dimensions.
 const CARRIED_ERROR: f64 = 0.4;
 
-/// Error of each one's place, in x and in y, over their distance. Against solutions in three
-/// dimensions each is told nearer to the other by 0.9 % of it in the mean and 2 % at most.
+/// Error of each position in x and in y, relative to the distance of the two. Compared with
+/// solutions in three dimensions, each is estimated too close to the other, by 0.9 % of the
+/// distance on average and 2 % at most.
 const PLACE_ERROR: f64 = 0.015;
 
-/// Two inclusions under one assumption about the face.
+/// Fits of two inclusions under one assumption about the face.
 struct Pair {
     lumps: [Hypothesis; 2],
 }
@@ -59,7 +61,7 @@ impl Pair {
         self.lumps[1].evidence()
     }
 
-    /// These with that one first which is nearer to a place.
+    /// Orders the pair so that the inclusion nearer to a position comes first.
     fn nearer_first(mut self, [x, y]: [f64; 2]) -> Self {
         let places = self.fits().map(|fit| fit.parameters.place.centre_m);
         let away: Vec<f64> = places.map(|at| (at[0] - x).hypot(at[1] - y)).collect();
@@ -73,7 +75,7 @@ impl Pair {
         self.lumps.iter().filter_map(|one| one.lump.as_ref())
     }
 
-    /// Whether the fits settled, explain the pressure, and the inclusions do not overlap.
+    /// Whether the fits converged and explain the pressure, and the inclusions do not overlap.
     fn is_possible(&self, observed: &Observed) -> bool {
         self.fits().all(|fit| {
             fit.converged && !is_poor(fit.misfit, observed) && apart(&fit.parameters) > 1.0
@@ -81,7 +83,7 @@ impl Pair {
     }
 }
 
-/// Distance of two inclusions over that at which they touch.
+/// Distance of two inclusions relative to the distance at which they touch.
 fn apart(both: &Parameters) -> f64 {
     let of = |one: &Parameters| {
         let width = one.lump.map_or(0.0, |lump| lump.axes_m()[0]);
@@ -91,9 +93,9 @@ fn apart(both: &Parameters) -> f64 {
     (at[0] - other_at[0]).hypot(at[1] - other_at[1]) / (0.5 * (width + other_width))
 }
 
-/// How many times as large the error of the product of ratios is as that of shallow inclusions: the
-/// pressures that deep ones add overlap. Two with their middles as deep as they are apart were told
-/// three of their errors too wide without.
+/// Factor by which the error of the product of ratios exceeds that of shallow inclusions, because
+/// the contributions of deep ones overlap. Without it, two inclusions with their centres as deep as
+/// their distance were estimated too far apart by three standard errors.
 fn side_by_side(both: &Parameters) -> f64 {
     let middle = |one: &Parameters| {
         let lump = one.lump.map(|lump| lump.depth_m + 0.5 * lump.axes_m()[1]);
@@ -105,8 +107,8 @@ fn side_by_side(both: &Parameters) -> f64 {
 }
 
 impl InclusionSearch {
-    /// Two inclusions, where the best fit of one is poor and one of two is good. `ones` are the
-    /// fits of one under each assumption about the face, the best first.
+    /// Fits two inclusions. Returns them if the best fit of one is poor and that of two is good.
+    /// `ones` are the fits of one inclusion under each assumption about the face, the best first.
     pub(crate) fn pair(
         &self,
         observed: &Observed,
@@ -118,7 +120,7 @@ impl InclusionSearch {
         if observed.cells.is_none() || !is_poor(one.misfit, observed) {
             return None;
         }
-        // Of a block that may be plain no inclusion was fitted.
+        // If the block may be plain, no inclusion was fitted.
         let is_fitted = |one: &&Hypothesis| one.problem.priors.len() > BLOCK_COORDINATES;
         let fitted: Vec<&Hypothesis> = ones.iter().filter(is_fitted).collect();
         let mut pairs: Vec<Pair> = (fitted.iter())
@@ -204,7 +206,7 @@ impl InclusionSearch {
             };
             let mut settled = |start: &Parameters| -> Option<Fit> {
                 let mut fit = problem.fit(start, ending, || counter.step())?;
-                // A mesh that was moved far holds a fit up: it goes on with one of its own.
+                // A mesh that was moved far delays the fit, which then continues on a new mesh.
                 for _ in 0..2 {
                     if !fit.converged {
                         fit = problem.fit(&fit.parameters, ending, || counter.step())?;
@@ -215,7 +217,8 @@ impl InclusionSearch {
             let fit = settled(&at)?;
             at = fit.parameters.clone();
             if resolution == Resolution::Answer {
-                // The same with the second one first, whose posterior is followed then.
+                // Repeats this with the second inclusion in first position, to follow its
+                // posterior.
                 let swapped = settled(&at.swapped())?;
                 let both = [(problem.clone(), fit), (problem, swapped)];
                 let lumps = both.map(|(problem, fit)| Hypothesis {
@@ -232,18 +235,18 @@ impl InclusionSearch {
         None
     }
 
-    /// Two like inclusions, the product of whose ratios is nearest to the last frame's pressure
-    /// over the plain block's.
+    /// Start with two equal inclusions, whose product of ratios is closest to the pressure of the
+    /// last frame over that of the plain block.
     ///
-    /// Logarithms of ratios add. Those of small strain under the axis are laid around each place of
-    /// a grid; for each two places the multiples that fit best are found.
+    /// Logarithms of ratios add up. Those of small strain on the axis are moved to each position of
+    /// a grid; for each pair of positions the best multiples are fitted.
     fn pair_start(&self, observed: &Observed, one: &Hypothesis) -> Option<Parameters> {
         let forward = Forward {
             kinematics: Kinematics::Linear,
             fineness: FINENESS,
             ..one.problem.forward.clone()
         };
-        // A fit of one is bent out of what is known of the block.
+        // A fit of one inclusion distorts the parameters of the block away from their priors.
         let mut block = self.known_block(one.homogeneous.parameters.block_modulus_pa);
         block.strayed_m =
             vec![[0.0; 2]; one.problem.forward.cells.as_ref()?.positions.axes_m.len()];

@@ -1,52 +1,52 @@
-//! What a block's pressure depends on.
+//! Parameters that determine the pressure of a block.
 
-/// Relative step of the difference quotients: the truncation error is about as large as the step,
-/// rounding and the unbalanced force of 1e-8 stay a hundred times below.
+/// Relative step of the difference quotients. The truncation error is about as large as the step;
+/// rounding and the unbalanced force of 1e-8 are a hundred times smaller.
 const STEP: f64 = 1e-5;
 
-/// Where an inclusion is, seen from above, and how far its outline there is from a circle.
+/// Position of an inclusion as seen from above, and the elongation of its outline.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Place {
-    /// Its middle (x, y) from the face's axis.
+    /// Centre (x, y) relative to the axis of the face.
     pub centre_m: [f64; 2],
     /// Half the logarithm of the ratio of its axes, times cosine and sine of twice the angle from x
-    /// to the longer one.
+    /// to the longer axis.
     pub elongation: [f64; 2],
-    /// How far tissue that is pressed flows away from the axis and carries the inclusion with it,
-    /// over its distance from the axis and the approach over the block's height.
+    /// Displacement of the inclusion by tissue that flows away from the axis, relative to its
+    /// distance from the axis and to the approach over the block's height.
     pub carried: f64,
-    /// How far the load spreads from the axis below the face, over its distance from the axis and
-    /// the cube of the depth in radii of the face.
+    /// Spread of the load away from the axis below the face, relative to the distance from the axis
+    /// and to the cube of the depth in radii of the face.
     pub spread: f64,
 }
 
-/// A block's unknowns.
+/// The unknowns of a block.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Parameters {
     pub block_modulus_pa: f64,
     pub lump: Option<LumpParameters>,
-    /// Where the inclusion is, which pressures of cells depend on.
+    /// Position of the inclusion, on which the pressures of cells depend.
     pub place: Place,
-    /// A second inclusion and its place.
+    /// A second inclusion and its position.
     pub second: Option<(LumpParameters, Place)>,
-    /// How far the axis of each press was from where it is said to have been: of the first ones,
-    /// the others are where they are said to be.
+    /// Deviation of the axis of each press from its stated position, for the first presses. The
+    /// others have none.
     pub strayed_m: Vec<[f64; 2]>,
-    /// What the approaches read too little.
+    /// Zero error: the amount by which the measured approaches are too small.
     pub zero_m: f64,
     pub height_m: f64,
-    /// Of tissue and inclusion.
+    /// Poisson ratio of tissue and inclusion.
     pub poisson_ratio: f64,
 }
 
-/// An inclusion's unknowns.
+/// The unknowns of an inclusion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LumpParameters {
-    /// Of the ball of equal volume.
+    /// Diameter of the ball of equal volume.
     pub diameter_m: f64,
     pub depth_m: f64,
     pub youngs_modulus_pa: f64,
-    /// Its height over its width.
+    /// Height over width.
     pub aspect: f64,
 }
 
@@ -60,14 +60,14 @@ impl LumpParameters {
         }
     }
 
-    /// Its width across the axis and its height along it.
+    /// Width across the axis and height along it.
     pub(crate) fn axes_m(&self) -> [f64; 2] {
         let root = self.aspect.cbrt();
         [self.diameter_m / root, self.diameter_m * root * root]
     }
 }
 
-/// An unknown as the fit sees it: logarithms of lengths and moduli, where errors are nearly
+/// An unknown as used in the fit. Lengths and moduli are logarithms, whose errors are nearly
 /// Gaussian.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Coordinate {
@@ -87,22 +87,22 @@ pub(crate) enum Coordinate {
     Height,
     /// ν.
     PoissonRatio,
-    /// x and y of the inclusion's middle, in metres.
+    /// x and y of the inclusion's centre, in metres.
     Centre(usize),
-    /// Its elongation along x and between the axes.
+    /// Elongation of the inclusion along x and between the axes.
     Elongation(usize),
-    /// How far the inclusion is carried from the axis.
+    /// Displacement of the inclusion away from the axis.
     Carried,
-    /// How far the load spreads from the axis.
+    /// Spread of the load away from the axis.
     Spread,
-    /// x and y of how far a press was from where it is said to have been, in metres.
+    /// x and y of the deviation of a press from its stated position, in metres.
     Strayed(usize, usize),
     /// A coordinate of the second inclusion.
     OfSecond(&'static Coordinate),
 }
 
 impl Coordinate {
-    /// A change of this coordinate that matters about as much as one of a logarithm by 1.
+    /// A change of this coordinate that matters about as much as a change of a logarithm by 1.
     pub(crate) fn unit(self) -> f64 {
         match self {
             Self::Zero => 1e-3,
@@ -113,12 +113,13 @@ impl Coordinate {
         }
     }
 
-    /// The same coordinate of the second inclusion, where it is one of an inclusion's.
+    /// The corresponding coordinate of the second inclusion. `None` if it is not a coordinate of an
+    /// inclusion.
     pub(crate) fn of_second(self) -> Option<Self> {
         OF_LUMP.iter().find(|c| **c == self).map(Self::OfSecond)
     }
 
-    /// Whether a block solved with its inclusion under the axis does not depend on it.
+    /// Whether a block solved with its inclusion on the axis is independent of this coordinate.
     pub(crate) fn is_place(self) -> bool {
         matches!(
             self,
@@ -153,8 +154,8 @@ pub(crate) static OF_LUMP: [Coordinate; 10] = [
     Coordinate::Spread,
 ];
 
-/// Largest Poisson ratio of a fit: the pressure differs from an incompressible block's by 0.1 %,
-/// and beyond it the derivatives by sizes lose digits as the bulk modulus grows.
+/// Maximum Poisson ratio of a fit. There the pressure differs from that of an incompressible block
+/// by 0.1 %. Above it the derivatives by sizes lose digits as the bulk modulus grows.
 pub(crate) const LARGEST_POISSON_RATIO: f64 = 0.499;
 
 impl Parameters {
@@ -234,7 +235,8 @@ impl Parameters {
 
     /// Step of a difference quotient.
     ///
-    /// By Poisson's ratio it is small against 1 − 2ν: the bulk modulus grows as its reciprocal.
+    /// For Poisson's ratio it is small compared with 1 − 2ν, because the bulk modulus is
+    /// proportional to its reciprocal.
     pub(crate) fn small_step(&self, coordinate: Coordinate) -> f64 {
         match coordinate {
             Coordinate::PoissonRatio => -STEP * (1.0 - 2.0 * self.poisson_ratio),
@@ -242,8 +244,8 @@ impl Parameters {
         }
     }
 
-    /// Whether an inclusion comes nearer to the surface or the stage than a fiftieth of its
-    /// diameter, or is as tall as the block allows.
+    /// Whether an inclusion is closer to the surface or the stage than a fiftieth of its diameter,
+    /// or is as tall as the block permits.
     pub(crate) fn is_at_boundary(&self) -> bool {
         self.lump.is_some_and(|lump| {
             let height = lump.axes_m()[1];

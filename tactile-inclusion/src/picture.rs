@@ -1,50 +1,50 @@
-//! Pressure over the whole face, with a lump that is not under its axis.
+//! Pressure over the whole face, with an off-axis lump.
 //!
-//! A block solved with the lump under the axis and the same block without one give the pressure
-//! with the lump anywhere: with r the distance from the axis, ρ that from the lump,
+//! The block is solved with the lump on the axis, and again without a lump. With r the distance
+//! from the axis and ρ that from the lump, the pressure for any position of the lump is
 //!
 //! $$ p(x, y) = p_\mathrm{plain}(r) \frac{p_\mathrm{axial}(\rho)}{p_\mathrm{plain}(\rho)} $$
 //!
-//! It is exact on the axis. Off it the load spreads below the face: with x and z the distances of
-//! the lump's middle from the axis and from the face, and s the outward part of the distance from
-//! where it shows, all in radii of the face, the lump shows at x/(1 + k z³), and ρ is that distance
-//! times (1 + n (x z)²)(1 + m (1 − 3 x²) x z s). The numbers k, n and m were fitted to blocks with
-//! a lump that were solved in three dimensions. What they leave grows as the rim comes nearer to
-//! the lump, and is part of the errors' covariance.
+//! This is exact on the axis. Off the axis, the load spreads below the face. Let x and z be the
+//! distances of the lump's centre from the axis and from the face, and s the outward component of
+//! the distance from its apparent position, all in radii of the face. The lump then appears at x/(1
+//! + k z³), and ρ is this distance times (1 + n (x z)²)(1 + m (1 − 3 x²) x z s). The constants k, n
+//! and m were fitted to blocks with a lump that were solved in three dimensions. The remaining
+//! error grows as the lump approaches the rim, and is part of the covariance.
 
 use crate::parameters::{Coordinate, Parameters, Place};
 use std::sync::Arc;
 use tactile_fem::{FrameResponse, SolvedFrames};
 
-/// How much faster the ratio falls outwards than inwards, over the product of the middle's depth z,
-/// its distance x from the axis and the distance from it, in radii of the face, and over 1 − 3 x²:
-/// towards the rim it falls alike. In solutions in three dimensions 0.5 to 0.85.
+/// Excess of the ratio's outward decay over its inward decay, relative to the product of the
+/// centre's depth z, its distance x from the axis and the distance from it, in radii of the face,
+/// and to 1 − 3 x²: towards the rim both are equal. Solutions in three dimensions give 0.5 to 0.85.
 const SKEW: f64 = 0.7;
 
-/// How much narrower the ratio is than on the axis, over the square of the product of the middle's
-/// depth and its distance from the axis, in radii of the face. In solutions in three dimensions 0.1
-/// to 0.6.
+/// Narrowing of the ratio compared with the axis, relative to the square of the product of the
+/// centre's depth and its distance from the axis, in radii of the face. Solutions in three
+/// dimensions give 0.1 to 0.6.
 const NARROWED: f64 = 0.5;
 
 impl Place {
-    /// The distance from the axis at which the face shows the inclusion, over its own: the load
-    /// that meets it comes from nearer to the axis. At some approach over the block's height, and
-    /// with its middle at some depth in radii of the face.
+    /// Distance from the axis at which the inclusion appears on the face, relative to its true
+    /// distance, because the load on it comes from nearer to the axis. `squeezed` is the approach
+    /// over the block's height, `depth` that of the centre in radii of the face.
     fn shown(&self, squeezed: f64, depth: f64) -> f64 {
         (1.0 + self.carried * squeezed) / (1.0 + self.spread * depth.powi(3))
     }
 
-    /// The distance from an inclusion under the axis at which the ratio is that at (x, y): in a
-    /// plane that is stretched so that the outline is round.
+    /// The equivalent distance from an inclusion on the axis for the ratio at (x, y), in a plane
+    /// that is stretched so that the outline is round.
     pub(crate) fn distance(&self, [x, y]: [f64; 2], squeezed: f64, depth: f64, face_m: f64) -> f64 {
         let shown = self.shown(squeezed, depth);
         let [dx, dy] = [x - shown * self.centre_m[0], y - shown * self.centre_m[1]];
-        // Further out no lump was solved.
+        // No lump further out was solved.
         let aside = (self.aside_m() / face_m).min(0.6);
         let outwards = (dx * self.centre_m[0] + dy * self.centre_m[1]) / face_m.powi(2);
         let skew = SKEW * depth * (1.0 - 3.0 * aside.powi(2)).max(0.0);
         let narrowed = 1.0 + NARROWED * (depth * aside).powi(2);
-        // Far on the inner side the skew would turn the distance around.
+        // Far on the inner side, the skew would reverse the distance.
         let scale = narrowed * (1.0 + skew * outwards).max(0.5);
         let [a, b] = self.elongation;
         let size = a.hypot(b);
@@ -56,20 +56,20 @@ impl Place {
         scale * along_x.hypot(along_y)
     }
 
-    /// Distance of the middle from the axis.
+    /// Distance of the centre from the axis.
     pub(crate) fn aside_m(&self) -> f64 {
         self.centre_m[0].hypot(self.centre_m[1])
     }
 }
 
-/// Middles of a face's cells, or of the cells of the same face pressed at several places.
+/// Centres of a face's cells, or of the cells of one face pressed at several positions.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct CellPositions {
-    /// (x, y) from the face's axis.
+    /// (x, y) relative to the axis of the face.
     pub positions_m: Vec<[f64; 2]>,
-    /// The press each cell belongs to.
+    /// The press to which each cell belongs.
     pub presses: Vec<usize>,
-    /// Where the axis of each press is said to have been.
+    /// Stated position of the axis of each press.
     pub axes_m: Vec<[f64; 2]>,
 }
 
@@ -77,15 +77,15 @@ pub(crate) struct CellPositions {
 #[derive(Debug, Clone)]
 pub(crate) struct PlainBlock {
     pub frames: SolvedFrames,
-    /// Its pressures by the tangent, which those after a change are compared with.
+    /// Its pressures by the tangent, the reference for those after a change.
     pub unchanged: Vec<FrameResponse>,
     /// Coordinates of the block with their values, a small step of each, and the pressures after
-    /// it.
+    /// this step.
     pub changes: Vec<(Coordinate, f64, f64, Vec<FrameResponse>)>,
 }
 
 impl PlainBlock {
-    /// Pressure of a frame at a distance from the axis: powers of that of the block solved, for
+    /// Pressure of a frame at a distance from the axis, scaled from that of the solved block:
     /// pressures are nearly proportional to powers of moduli and lengths.
     fn pressure_at(&self, frame: usize, radius_m: f64, block: &Parameters) -> f64 {
         let pressure = self.frames.states()[frame].pressure_at(radius_m);
@@ -98,21 +98,21 @@ impl PlainBlock {
     }
 }
 
-/// Cells and the plain block that carries a lump's pressure to them.
+/// Cells, and the plain block with which a lump's pressure is transferred to them.
 #[derive(Debug, Clone)]
 pub(crate) struct Cells {
     pub positions: Arc<CellPositions>,
-    /// The block without a lump, where it is solved.
+    /// The block without a lump. `None` before it is solved.
     pub plain: Option<Arc<PlainBlock>>,
-    /// Each frame's approach over the block's height.
+    /// Approach of each frame over the block's height.
     pub squeezed: Vec<f64>,
     pub face_radius_m: f64,
-    /// Radius up to which solutions with and without a lump are compared. Beyond, the rim's
-    /// singular pressure differs between their meshes.
+    /// Radius up to which solutions with and without a lump are compared. Outside, the singular
+    /// pressure at the rim differs between their meshes.
     pub reach_m: f64,
 }
 
-/// Middle of the least box around points, and half its longer side.
+/// Centre of the smallest box around points, and half its longer side.
 pub(crate) fn extent(points: &[[f64; 2]]) -> ([f64; 2], f64) {
     let range = |k: usize| {
         let values = points.iter().map(|point| point[k]);
@@ -126,7 +126,7 @@ pub(crate) fn extent(points: &[[f64; 2]]) -> ([f64; 2], f64) {
 }
 
 impl Cells {
-    /// Pressures of a frame from those of a block with its lump under the axis, or without one, and
+    /// Pressures of a frame from those of a block with its lump on the axis, or without one, and
     /// from those with a second lump there.
     pub(crate) fn pressures(
         &self,
@@ -160,8 +160,8 @@ impl Cells {
         positions_m.iter().zip(presses).map(at).collect()
     }
 
-    /// How many times as large as a plain block's the pressure of a frame is with a lump, at a cell
-    /// from an axis. `axial` is the pressure with the lump under the axis.
+    /// Ratio of a frame's pressure with a lump to that of a plain block, at a cell's distance from
+    /// an axis. `axial` is the pressure with the lump on the axis.
     fn ratio<'a>(
         &'a self,
         plain: &'a PlainBlock,
@@ -173,7 +173,7 @@ impl Cells {
         let (squeezed, face_m) = (self.squeezed[frame], self.face_radius_m);
         let inside =
             move |distance: f64| axial(distance) / plain.pressure_at(frame, distance, block);
-        // Beyond the edge the slope goes on and fades, as it does between there and the rim.
+        // Outside the edge the slope continues and fades, as it does between the edge and the rim.
         let (step, length) = (face_m / 16.0, face_m / 5.0);
         let edge = inside(self.reach_m);
         let slope = (edge - inside(self.reach_m - step)) / step;
@@ -193,17 +193,19 @@ impl Cells {
         }
     }
 
-    /// What is left of a lump's share at a distance from it, where it is so far from the axis: with
-    /// the third power of the distance, as that of a force pair under the surface.
+    /// Remaining fraction of a lump's contribution at a distance from it, if it is far from the
+    /// axis. It falls with the third power of the distance, like that of a force pair under the
+    /// surface.
     pub(crate) fn fade(&self, aside_m: f64, distance_m: f64) -> f64 {
-        // From the used part's edge to twice as far out a lump passes from under the face.
+        // Between the edge of the used part and twice this radius, a lump leaves the region under
+        // the face.
         let beyond = (aside_m / self.reach_m - 1.0).clamp(0.0, 1.0);
         let far = (self.reach_m / distance_m.max(self.reach_m)).powi(3);
         1.0 - beyond * (1.0 - far)
     }
 
-    /// How much more than a plain block's the pressure above the lump is, in the last frame,
-    /// relative.
+    /// Relative excess of the pressure above the lump over that of a plain block, in the last
+    /// frame.
     pub(crate) fn lift(&self, with_lump: &SolvedFrames) -> f64 {
         let last = |frames: &SolvedFrames| frames.states().last().map(|s| s.pressure_at(0.0));
         let plain = self.plain.as_ref().and_then(|plain| last(&plain.frames));
@@ -213,8 +215,8 @@ impl Cells {
         }
     }
 
-    /// The place about which the measured pressures over the plain block's are most nearly
-    /// symmetric: within half a cell of a lump's middle, where there is one.
+    /// The position about which the measured pressures, relative to the plain block, are most
+    /// nearly symmetric. If there is a lump, its centre is within half a cell of it.
     pub(crate) fn most_symmetric(&self, measured: &[f64]) -> [f64; 2] {
         let Some(plain) = &self.plain else {
             return [0.0; 2];
@@ -234,10 +236,11 @@ impl Cells {
             }
         }
         let ratios: Vec<f64> = sums.iter().map(|[with, without]| with / without).collect();
-        // Steps of a first grid and of one around its best node, over the face's radius: a lump
-        // that shows is wider than the first, and the fit goes on from the second.
+        // Steps of a first grid and of one around its best node, relative to the face radius. A
+        // detectable lump is wider than the first, and the fit refines the second.
         let steps = [1.0 / 16.0, 1.0 / 64.0];
-        // Lumps further out than this part of the face's radius are cut by the used part's edge.
+        // Lumps further out than this fraction of the face radius are cut by the edge of the used
+        // part.
         let face_radius_m = self.face_radius_m;
         let farthest = 0.75 * face_radius_m;
         let is_under =

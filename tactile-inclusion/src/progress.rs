@@ -3,7 +3,7 @@
 use core::ops::ControlFlow;
 use tactile_core::Progress;
 
-/// Counts solutions, reports each, and ends where the callback asks to.
+/// Counts solutions, reports each, and stops if the callback requests it.
 pub(crate) struct Counter<'a> {
     pub done: usize,
     pub expected: usize,
@@ -24,7 +24,7 @@ impl<'a> Counter<'a> {
         }
     }
 
-    /// Reports a solution. `false` where the search is to end.
+    /// Reports a solution. Returns `false` if the search must stop.
     pub(crate) fn step(&mut self) -> bool {
         if self.cancelled {
             return false;

@@ -1,17 +1,16 @@
-//! Follows the posterior along ln E₁.
+//! Marginal posteriors of an inclusion's parameters, which are not Gaussian: the posterior is
+//! followed along ln E₁.
 //!
-//! Marginal posteriors of an inclusion's parameters, which are not Gaussian.
-//!
-//! A stiff inclusion hardly changes the pressure when it gets stiffer still, and a small stiff one
-//! is hardly different from a large one that is little stiffer than the tissue. Along such a ridge
-//! the posterior's density falls neither fast nor evenly, and the curvature at its top says little
-//! of its length. With u = ln E₁, θ all other coordinates, F the fit's objective (−2 ln of the
-//! posterior), θ(u) its minimum at given u and M(u) its curvature there in θ,
+//! A stiff inclusion hardly changes the pressure if it becomes stiffer, and a small stiff one is
+//! hardly different from a large one that is slightly stiffer than the tissue. Along such a ridge
+//! the posterior density falls neither fast nor evenly, and the curvature at its maximum says
+//! little about its length. With u = ln E₁, θ all other coordinates, F the objective of the fit (−2
+//! ln of the posterior), θ(u) its minimum at given u and M(u) its curvature there in θ,
 //!
 //! $$ p(u) \propto |M(u)|^{-1/2} \exp(-F(u, \theta(u)) / 2) $$
 //!
-//! and at a given u the others are Gaussian about θ(u) with covariance M(u)⁻¹ (Laplace's
-//! approximation, nested: H. Rue, S. Martino & N. Chopin, J. R. Stat. Soc. B 71 (2009) 319), which
+//! and at a given u the other coordinates are Gaussian about θ(u) with covariance M(u)⁻¹ (nested
+//! Laplace approximation: H. Rue, S. Martino & N. Chopin, J. R. Stat. Soc. B 71 (2009) 319). This
 //! gives evidence, covariance and quantiles.
 
 use crate::fit::{Fit, FitStep, Normal, Problem};
@@ -20,36 +19,38 @@ use crate::parameters::{Coordinate, Parameters};
 use nalgebra::{DMatrix, DVector};
 use statrs::function::erf::erfc;
 
-/// Steps along a side, halved ones too; reached where E₁ is open and the prior alone ends it.
+/// Maximum number of steps on each side, halved ones included. It is reached if E₁ is open and only
+/// the prior limits it.
 const MAX_NODES: usize = 8;
 
-/// Fall of ln p in one step beyond which it was too long, and is halved: a Gaussian falls by 2.2
-/// in the second.
+/// Fall of ln p in one step above which the step was too long and is halved. For a Gaussian the
+/// second step falls by 2.2.
 const CLIFF: f64 = 3.0;
 
-/// Fall of ln p at which a side ends: that of 2.4 standard errors. Beyond, its slope goes on.
+/// Fall of ln p at which a side ends: that of 2.4 standard errors. The slope is extrapolated from
+/// there.
 const SIDE_FALL: f64 = 2.9;
 
-/// Largest step along ln E₁: mesh and tangent follow the ridge that far.
+/// Maximum step along ln E₁: mesh and tangent can follow the ridge this far.
 const LARGEST_RIDGE_STEP: f64 = 1.0;
 
-/// Step along ln E₁ in its local standard error.
+/// Step along ln E₁, in units of its local standard error.
 const RIDGE_STEP: f64 = 1.2;
 
-/// Fits to a side of the ridge, at most.
+/// Maximum number of fits on each side of the ridge.
 const MAX_STEPS: usize = 4;
 
-/// Distance from the ridge in standard errors above which one step to it does not do, and steps
-/// there.
+/// Distance from the ridge, in standard errors, above which one step to it is not enough, and the
+/// number of steps then.
 const LONG: f64 = 1.0;
 
-/// Fall of ln p beyond the last node up to which its slope is followed.
+/// Fall of ln p after the last node up to which its slope is extrapolated.
 const TAIL: f64 = 4.0;
 
-/// Largest rise of ln p between nodes: parabolas through uneven ones overshoot.
+/// Maximum rise of ln p between nodes: parabolas through uneven nodes overshoot.
 const RISE: f64 = 0.3;
 
-/// Points of the quadrature over u.
+/// Maximum number of quadrature points over u.
 const POINTS_LIMIT: usize = 200;
 
 /// The ridge at one E₁.
@@ -59,35 +60,35 @@ pub(crate) struct Node {
     pub density: f64,
     /// Values of all coordinates.
     pub at: DVector<f64>,
-    /// Their covariance at this E₁, whose own row is zero.
+    /// Covariance of the coordinates at this E₁. Its own row is zero.
     pub covariance: DMatrix<f64>,
 }
 
 /// The posterior along ln E₁.
 #[derive(Debug, Clone)]
 pub(crate) struct Ridge {
-    /// By ascending E₁.
+    /// Nodes in ascending order of E₁.
     pub nodes: Vec<Node>,
-    /// Of ln E₁ among the coordinates.
+    /// Index of ln E₁ among the coordinates.
     pub index: usize,
-    /// Logarithm of p's integral by the curvature at the optimum.
+    /// Logarithm of the integral of p by the curvature at the optimum.
     pub laplace: f64,
 }
 
 /// A point from which the ridge is followed.
 struct Place {
     parameters: Parameters,
-    /// Change of all coordinates by one of ln E₁, along the ridge.
+    /// Change of all coordinates per unit of ln E₁, along the ridge.
     tangent: DVector<f64>,
     /// Standard error of ln E₁.
     error: f64,
-    /// How far the parameters were from the ridge, in standard errors.
+    /// Distance of the parameters from the ridge, in standard errors.
     away: f64,
     solved: Solved,
 }
 
 impl Problem {
-    /// The posterior along ln E₁ through an optimum with an inclusion. `None` where it has no
+    /// The posterior along ln E₁ through an optimum with an inclusion. `None` if it has no
     /// curvature there.
     pub(crate) fn ridge(&self, fit: &Fit, mut go_on: impl FnMut() -> bool) -> Option<Ridge> {
         let index = (self.coordinates().iter()).position(|c| *c == Coordinate::LumpModulus)?;
@@ -113,8 +114,8 @@ impl Problem {
                 };
                 let density = node.density;
                 if density < before - CLIFF {
-                    // The ridge bends or ends on the way: an inclusion as soft as the tissue is
-                    // none.
+                    // The ridge bends or ends on the way, since an inclusion as soft as the tissue
+                    // does not exist.
                     part *= 0.5;
                     continue;
                 }
@@ -139,8 +140,7 @@ impl Problem {
         })
     }
 
-    /// The ridge at the E₁ of some parameters nearby, solved anew where the first step to it was
-    /// long.
+    /// The ridge at the E₁ of nearby parameters, solved again if the first step to it was long.
     fn settled_node(
         &self,
         at: &Parameters,
@@ -162,7 +162,7 @@ impl Problem {
         Some(found)
     }
 
-    /// The ridge at the E₁ of some parameters nearby.
+    /// The ridge at the E₁ of nearby parameters.
     fn node(&self, at: &Parameters, normal: Normal, index: usize) -> Option<(Node, Place)> {
         let FitStep { by, size } = self.step(at, &normal, 0.0, Some(index))?;
         let fall = 2.0 * by.dot(&normal.gradient) - by.dot(&(&normal.matrix * &by));
@@ -205,21 +205,21 @@ impl Problem {
 pub(crate) struct Marginal {
     weights: Vec<f64>,
     points: Vec<Node>,
-    /// Logarithm of the evidence over that by the curvature at the optimum.
+    /// Log-evidence relative to that by the curvature at the optimum.
     pub gain: f64,
-    /// Probability that the inclusion is a ball, where it is as likely as not beforehand.
+    /// Probability that the inclusion is a ball, with a prior probability of one half.
     pub ball: f64,
 }
 
 impl Node {
-    /// This point of the ridge for an inclusion that is a ball: where the logarithm of its height
-    /// over its width, a coordinate of index `shape`, is zero. `density` is that of zero.
+    /// This point of the ridge if the inclusion is a ball: the logarithm of its height over its
+    /// width, the coordinate with the index `shape`, is then zero. `density` is that at zero.
     fn of_ball(&self, shape: usize) -> Self {
         let gains = self.covariance.column(shape) / self.covariance[(shape, shape)];
         let away = self.at[shape];
         let variance = self.covariance[(shape, shape)];
         let mut covariance = &self.covariance - variance * &gains * gains.transpose();
-        // A ball's is known; a quantile divides by its error.
+        // The shape of a ball is exact, but a quantile divides by its error.
         covariance[(shape, shape)] = f64::MIN_POSITIVE;
         Self {
             density: -0.5 * (away * away / variance + variance.ln()),
@@ -230,7 +230,7 @@ impl Node {
 }
 
 /// A function of the nodes at `x` in the interval after node `k`: the mean of the parabolas through
-/// the nodes around it.
+/// the surrounding nodes.
 fn between(xs: &[f64], ys: &[f64], k: usize, x: f64) -> f64 {
     let parabola = |first: usize| -> f64 {
         let [a, b, c] = [xs[first], xs[first + 1], xs[first + 2]];
@@ -245,7 +245,7 @@ fn between(xs: &[f64], ys: &[f64], k: usize, x: f64) -> f64 {
     }
 }
 
-/// The ridge between its nodes and beyond the outermost.
+/// The ridge between its nodes and outside the outermost ones.
 struct Curve<'a> {
     nodes: &'a [Node],
     /// ln E₁ of the nodes, ascending.
@@ -253,8 +253,8 @@ struct Curve<'a> {
 }
 
 impl Curve<'_> {
-    /// Fall of ln p by ln E₁ beyond the first node, or the last: the parabola's through three
-    /// there, not below the last interval's and not negative.
+    /// Slope of ln p over ln E₁ outside the first or last node: that of the parabola through the
+    /// three nodes there, at least that of the last interval and not negative.
     fn slope(&self, is_first: bool) -> f64 {
         let last = self.xs.len() - 1;
         let [a, b, c] = if is_first {
@@ -270,12 +270,12 @@ impl Curve<'_> {
         (near + ((near - far) * step(a, b) / step(a, c)).max(0.0)).max(0.0)
     }
 
-    /// How far that slope is followed.
+    /// Distance up to which that slope is extrapolated.
     fn tail(&self, is_first: bool) -> f64 {
         let last = self.xs.len() - 1;
         let [outer, inner] = if is_first { [0, 1] } else { [last, last - 1] };
         let step = (self.xs[outer] - self.xs[inner]).abs();
-        // A side that ended before p fell is followed as far as its last step.
+        // A side that ended before p fell is extrapolated by its last step.
         (TAIL / self.slope(is_first).max(1e-9)).clamp(step, 4.0 * step)
     }
 
@@ -312,12 +312,12 @@ impl Curve<'_> {
 }
 
 impl Marginal {
-    /// Of a ridge. `None` where neither side could be followed.
+    /// Computes the posteriors of a ridge. `None` if neither side could be followed.
     ///
-    /// `shape` is the index of the logarithm of an inclusion's height over its width and the
-    /// standard error it is known with beforehand. A ball and a spheroid are equally likely
-    /// beforehand, and the posterior is the mixture of both. With κ that logarithm, the odds of a
-    /// ball are p(κ = 0 | y) / p(κ = 0) (J. M. Dickey, Ann. Math. Stat. 42 (1971) 204).
+    /// `shape` holds the index of the logarithm of an inclusion's height over its width and its
+    /// prior standard error. A ball and a spheroid have equal prior probabilities, and the
+    /// posterior is the mixture of both. With κ that logarithm, the odds of a ball are p(κ = 0 | y)
+    /// / p(κ = 0) (J. M. Dickey, Ann. Math. Stat. 42 (1971) 204).
     pub(crate) fn new(ridge: &Ridge, shape: Option<(usize, f64)>) -> Option<Self> {
         let (nodes, index) = (&ridge.nodes, ridge.index);
         let xs: Vec<f64> = nodes.iter().map(|node| node.at[index]).collect();
@@ -333,7 +333,7 @@ impl Marginal {
             .map(|point| curve.at(from + (point as f64 + 0.5) * step))
             .collect();
         for point in &mut points {
-            // The point's own width.
+            // Variance of the quadrature interval itself.
             point.covariance[(index, index)] = step * step / 12.0;
         }
         let largest = (points.iter())
@@ -371,20 +371,20 @@ impl Marginal {
         self
     }
 
-    /// The value that a coordinate is as probably above as below: the optimum of a skewed posterior
-    /// lies at an end of its interval.
+    /// The median of a coordinate. The optimum of a skewed posterior lies at one end of its
+    /// interval.
     pub(crate) fn median(&self, coordinate: usize) -> f64 {
         self.quantile(coordinate, 0.5)
     }
 
-    /// The 95 % interval of a coordinate, with equal tails. It holds 96, 98 and 97 % of 161
-    /// inclusions' D, d and E₁ by CalculiX, the likelihood ratio's 96, 98 and 98
-    /// (`inclusion_study`).
+    /// The 95 % interval of a coordinate, with equal tails. It contains 96, 98 and 97 % of the true
+    /// D, d and E₁ of 161 inclusions by CalculiX; the likelihood-ratio interval contains 96, 98 and
+    /// 98 % (`inclusion_study`).
     pub(crate) fn interval(&self, coordinate: usize) -> [f64; 2] {
         [0.025, 0.975].map(|probability| self.quantile(coordinate, probability))
     }
 
-    /// The value that a coordinate is below with this probability.
+    /// The quantile of a coordinate for a probability.
     fn quantile(&self, coordinate: usize, probability: f64) -> f64 {
         let each = || {
             (self.points.iter()).map(|point| {

@@ -1,10 +1,10 @@
-//! Several presses at stated places of one block.
+//! Several presses at stated positions of one block.
 
 use crate::picture::CellPositions;
 use crate::tissue_block::{PressureProfile, check};
 use tactile_elasticity::{ElasticityError, Quantity};
 
-/// Presses at stated places of a block that is far wider than the guide.
+/// Presses at stated positions of a block that is much wider than the guide.
 ///
 /// ```
 /// use tactile_inclusion::{PressureProfile, Scan, ScanPress};
@@ -26,13 +26,14 @@ use tactile_elasticity::{ElasticityError, Quantity};
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scan {
-    /// All with the same approaches.
+    /// Presses, all with the same approaches.
     pub presses: Vec<ScanPress>,
-    /// Standard error of each press's place, in x and in y: a robot's, or a hand's.
+    /// Standard error of each press's position, in x and in y, for a robot or a hand.
     pub position_error_m: f64,
 }
 
-/// A press of a scan: the guide's face at one place of a block, pressed to some approaches.
+/// A press of a scan: the face of the guide at one position of a block, pressed to several
+/// approaches.
 ///
 /// ```
 /// use tactile_inclusion::ScanPress;
@@ -42,11 +43,11 @@ pub struct Scan {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScanPress {
-    /// Where the guide's axis was (x, y), in metres.
+    /// Position (x, y) of the guide's axis, in metres.
     pub axis_m: [f64; 2],
-    /// Middles (x, y) of the face's cells from that axis, in metres.
+    /// Centres (x, y) of the face's cells relative to that axis, in metres.
     pub positions_m: Vec<[f64; 2]>,
-    /// Pressures of each approach on these cells. Forces are not used.
+    /// Pressures on these cells for each approach. Forces are not used.
     pub frames: Vec<PressureProfile>,
 }
 
@@ -54,8 +55,8 @@ impl Scan {
     /// The cells of all presses within a radius, and their frames side by side.
     ///
     /// # Errors
-    /// No press. An error of place that is negative or NaN. Approaches that do not grow or differ
-    /// between presses. Lengths that differ. Values that are not finite.
+    /// An error if there is no press, the position error is negative or NaN, approaches do not
+    /// increase or differ between presses, lengths differ, or values are not finite.
     pub(crate) fn joined(
         &self,
         radius_m: f64,
@@ -83,7 +84,7 @@ impl Scan {
             for coordinate in press.positions_m.iter().flatten().chain(&press.axis_m) {
                 Quantity::Distance.finite(*coordinate)?;
             }
-            // A cell on the axis is one.
+            // A cell on the axis gets a positive radius.
             let radius = |[x, y]: &[f64; 2]| x.hypot(*y).max(f64::MIN_POSITIVE);
             let radii_m: Vec<f64> = press.positions_m.iter().map(radius).collect();
             check(&radii_m, &press.frames)?;

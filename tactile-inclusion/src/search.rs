@@ -1,5 +1,5 @@
-//! Search for an inclusion: first fits without one, first fits under each assumption about the face,
-//! and the answer's from them.
+//! Search for an inclusion: fits without one, then first fits and final fits under each assumption
+//! about the face.
 
 use crate::covariance::{Observed, ObservedCells, Resolution};
 use crate::estimate::InclusionEstimate;
@@ -18,62 +18,63 @@ use tactile_core::Progress;
 use tactile_elasticity::{ElasticityError, Quantity};
 use tactile_fem::{Guide, Interface, Kinematics};
 
-/// Difference of log evidence beyond which another assumption about the face is not fitted to the
+/// Difference of log-evidence above which the other assumption about the face is not fitted to the
 /// end.
 const RIVAL_EVIDENCE: f64 = 16.0;
 
-/// Prior standard deviation of an inclusion's elongations, as logarithms.
+/// Prior standard deviation of an inclusion's elongations (logarithms).
 const ELONGATION: f64 = 0.2;
 
-/// Fewer rings do not show an inclusion's shape.
+/// With fewer rings the shape of an inclusion is not resolved.
 const MIN_RINGS: usize = 8;
 
-/// χ² of the first fit over its degrees of freedom up to which the block may be plain. The
-/// meshes' errors bring homogeneous blocks by CalculiX to 1.5, under the wrong assumption about
-/// the face to 2.2; what an inclusion adds above 2 needs no test.
+/// χ² of the first fit over its degrees of freedom up to which the block may be plain. Mesh errors
+/// bring homogeneous blocks by CalculiX to 1.5, and to 2.2 under the wrong assumption about the
+/// face. If an inclusion raises it above 2, no test is needed.
 const DOUBTFUL: f64 = 2.0;
 
-/// Elements along an eighth of the inclusion's circumference, of a homogeneous block's first fit
-/// and of the grid.
+/// Elements along an eighth of the inclusion's circumference, for the first fit of a homogeneous
+/// block and for the grid.
 const HOMOGENEOUS_FINENESS: usize = 2;
 
-/// The part of the better misfit in [`HOPELESS_EVIDENCE`].
+/// The fraction of the better misfit in [`HOPELESS_EVIDENCE`].
 const HOPELESS_MISFIT: f64 = 0.05;
 
-/// Difference of the first fits' log evidence beyond which an assumption about the face is given
-/// up: this and a part of the better one's misfit, most of which is the mesh's.
+/// Difference of log-evidence between the first fits above which an assumption about the face is
+/// discarded. A fraction of the better misfit, most of which is mesh error, is added.
 const HOPELESS_EVIDENCE: f64 = 25.0;
 
-/// Starts that are fitted. With tempered errors most end in one optimum; a third adds a quarter
-/// of the time.
+/// Number of starts that are fitted. With tempered errors most lead to the same optimum; a third
+/// start takes a quarter more time.
 const FITTED_STARTS: usize = 2;
 
 /// Elements along an eighth of the inclusion's circumference in the first fits with an inclusion.
 const FIRST_FINENESS: usize = 3;
 
-/// Difference of the first fits' log evidence beyond which a block is not plain.
+/// Difference of log-evidence between the first fits above which a block is not plain.
 const CERTAIN_EVIDENCE: f64 = 50.0;
 
-/// Part of the guide's radius within which pressures are used: further out the singular rim rules,
-/// where meshes disagree by percents.
+/// Fraction of the guide's radius within which pressures are used. Further out the singular rim
+/// dominates, where meshes differ by several per cent.
 pub(crate) const USED_FACE: f64 = 0.75;
 
-/// Radial displacement of tissue under a face over the radius and the mean strain of the block, and
-/// its standard error. Of incompressible tissue it is half the strain at its depth, which is larger
-/// than the mean by some tenths as the strain fades with the depth. In solutions in three
-/// dimensions 0.53 to 0.70.
+/// Radial displacement of tissue under a face, relative to the radius and the mean strain of the
+/// block, and its standard error. For incompressible tissue it is half the strain at that depth,
+/// which exceeds the mean by several tenths because the strain decreases with depth. Solutions in
+/// three dimensions give 0.53 to 0.70.
 const CARRIED: (f64, f64) = (0.6, 0.1);
 
-/// How far the load spreads below the face ([`Place::spread`]), and its standard error.
+/// Spread of the load below the face ([`Place::spread`]), and its standard error.
 const SPREAD: (f64, f64) = (0.13, 0.07);
 
-/// Finds a spheroidal inclusion in a block from the pressure on a guide's face at some approaches.
+/// Finds a spheroidal inclusion in a block from the pressure on a guide's face at several
+/// approaches.
 ///
-/// Maximum a posteriori over ln D, ln d, ln E₁, the inclusion's height over its width, ln E₀, the
-/// block's height, ν and the approaches' zero by Levenberg–Marquardt on finite-strain finite
-/// elements from several starts. A score test first shows whether an inclusion would explain more
-/// than the homogeneous block. Intervals by following the posterior along ln E₁. An inclusion's
-/// probability from the evidence with and without one.
+/// The maximum a posteriori estimate over ln D, ln d, ln E₁, the height over width of the
+/// inclusion, ln E₀, the block's height, ν and the approach zero is found by Levenberg–Marquardt
+/// with finite-strain finite elements, from several starts. A score test first decides whether an
+/// inclusion would explain more than the homogeneous block. Intervals follow the posterior along ln
+/// E₁. The probability of an inclusion follows from the evidence with and without one.
 ///
 /// ```no_run
 /// use core::ops::ControlFlow;
@@ -89,7 +90,7 @@ const SPREAD: (f64, f64) = (0.13, 0.07);
 /// // A sensor whose calibration is twice as good as usual.
 /// let search =
 ///     search.with_sensor_errors(SensorErrors { common: 1.5e-3, ..SensorErrors::default() })?;
-/// // Would two frames tell enough of a small lump?
+/// // Are two frames enough for a small lump?
 /// let lump = AssumedInclusion {
 ///     diameter_m: 8e-3,
 ///     depth_m: 4e-3,
@@ -117,25 +118,25 @@ pub struct InclusionSearch {
     shape_error: f64,
 }
 
-/// Difference of log evidence above which one assumption about the face is clearly better: 20 to 1
-/// and three times as much again for what the finite elements err by on a sliding face, which the
-/// covariance knows by its size alone. Two frames on soft tissue by CalculiX preferred the wrong
-/// one by up to 13, beside a poor fit (`inclusion_study` on the scenes of
-/// `evidence/inclusion_scenes.py`); the price is intervals that hold under both where the right one
-/// leads by less. Where the better one leaves more than the errors explain, differences count as
-/// much less (K. P. Burnham & D. R. Anderson, *Model Selection and Multimodel Inference* (2002),
+/// Difference of log-evidence above which one assumption about the face is clearly better. It
+/// consists of odds of 20 to 1, and three times as much for the finite-element error on a sliding
+/// face, of which the covariance contains only the size. Two frames on soft tissue by CalculiX
+/// favoured the wrong assumption by up to 13, with a poor fit (`inclusion_study` on the scenes of
+/// `evidence/inclusion_scenes.py`). In exchange, intervals cover both assumptions if the correct
+/// one leads by less. If the better fit leaves residuals above the errors, differences are reduced
+/// accordingly (K. P. Burnham & D. R. Anderson, *Model Selection and Multimodel Inference* (2002),
 /// §2.5).
 pub(crate) const CLEAR_EVIDENCE: f64 = 12.0;
 
-/// Standard error of the logarithm of an inclusion's height over its width, where nothing is said:
-/// 1.75 to one and one to 1.75 are at its 95 % range's ends.
+/// Default standard error of the logarithm of an inclusion's height over its width: the 95 % range
+/// extends from 1 : 1.75 to 1.75 : 1.
 const SHAPE_ERROR: f64 = 0.29;
 
 impl InclusionSearch {
-    /// A block under a guide, with [`SensorErrors::default`].
+    /// A search in a block under a guide, with [`SensorErrors::default`].
     ///
     /// # Errors
-    /// A block that is no wider than the guide.
+    /// An error for a block that is no wider than the guide.
     pub fn new(specimen: TissueBlock, guide: Guide) -> Result<Self, ElasticityError> {
         if specimen.radius_m() <= guide.radius_m() {
             return Err(Quantity::Radius.beyond(specimen.radius_m(), guide.radius_m()));
@@ -148,33 +149,34 @@ impl InclusionSearch {
         })
     }
 
-    /// Sets the standard error of the logarithm of an inclusion's height over its width, which is
-    /// 0.29 until set. It is fitted with the rest, and its uncertainty is in the intervals. 0 says
-    /// that an inclusion can be nothing but a ball.
+    /// Sets the standard error of the logarithm of an inclusion's height over its width (default
+    /// 0.29). The ratio is fitted with the other parameters, and its uncertainty enters the
+    /// intervals. With 0 every inclusion is a ball.
     ///
     /// # Errors
-    /// Negative or NaN.
+    /// An error for a negative value or NaN.
     pub fn with_shape_error(mut self, error: f64) -> Result<Self, ElasticityError> {
         self.shape_error = Quantity::StandardError.not_negative(error)?;
         Ok(self)
     }
 
-    /// Sets the sensor's smooth errors.
+    /// Sets the smooth errors of the sensor.
     ///
     /// # Errors
-    /// Negative or NaN. A correlation length or a force error of zero.
+    /// An error for a negative value or NaN, or a correlation length or force error of zero.
     pub fn with_sensor_errors(mut self, errors: SensorErrors) -> Result<Self, ElasticityError> {
         self.sensor = errors.checked()?;
         Ok(self)
     }
 
-    /// The inclusion that explains ring means at `radii_m` (metres, ascending) best. Rings beyond
-    /// three quarters of the guide's radius are not used. Some 100 finite-element solutions.
+    /// The inclusion that best fits ring means at `radii_m` (metres, ascending). Rings outside
+    /// three quarters of the guide's radius are not used. It takes about 100 finite-element
+    /// solutions.
     ///
     /// # Errors
-    /// No frame. Approaches that do not grow. Lengths that differ. Values that are not finite.
-    /// Fewer than eight rings within reach. [`ElasticityError::NoSolution`] where the approaches
-    /// are beyond what the block's finite elements bear.
+    /// An error if there is no frame, approaches do not increase, lengths differ, values are not
+    /// finite, or fewer than eight rings are within reach. [`ElasticityError::NoSolution`] if the
+    /// approaches are too large for the finite elements of the block.
     pub fn search(
         &self,
         radii_m: &[f64],
@@ -183,10 +185,10 @@ impl InclusionSearch {
         self.search_with_progress(radii_m, frames, &mut |_| ControlFlow::Continue(()))
     }
 
-    /// As [`Self::search`]. `progress` hears of every solution and may end the search.
+    /// Like [`Self::search`]. `progress` is called for each solution and may stop the search.
     ///
     /// # Errors
-    /// Those of [`Self::search`]. [`ElasticityError::Cancelled`].
+    /// Those of [`Self::search`], and [`ElasticityError::Cancelled`].
     pub fn search_with_progress(
         &self,
         radii_m: &[f64],
@@ -199,19 +201,20 @@ impl InclusionSearch {
         self.search_observed(&observed, &approaches_m, progress)
     }
 
-    /// As [`Self::search_with_progress`], from whole faces: the inclusion may lie off the axis. The
-    /// presses, one or several, are at places of a block that is far wider than the guide: one
-    /// posterior over all of them, with one inclusion or two. How far each
-    /// press was from where it is said to have been is fitted along, and each has an error of its
-    /// own of the approaches' zero. The inclusion's place is given in the presses' coordinates.
-    /// Only places under the used part of some press's face are searched. Two are told where one
-    /// leaves more than the errors explain and two do not. The time grows as the third power of
-    /// the number of all cells: a fifteenth of the face's radius resolves what one press shows, an
-    /// eighth is narrow enough for five presses. The force is not used.
+    /// Like [`Self::search_with_progress`], from whole faces: the inclusion may lie off the axis.
+    /// The scan has one or several presses at positions of a block that is much wider than the
+    /// guide. There is one posterior over all of them, with one inclusion or two. The deviation of
+    /// each press from its stated position is fitted, and each press has its own error of the
+    /// approach zero. The position of the inclusion is given in the coordinates of the presses.
+    ///
+    /// Only positions under the used part of a press's face are searched. The result has two
+    /// inclusions if a single one does not fit within the errors and two do. The time grows with
+    /// the third power of the number of cells: a fifteenth of the face radius resolves what a
+    /// single press shows, and an eighth is narrow enough for five presses. The force is not used.
     ///
     /// # Errors
-    /// Those of [`Self::search_with_progress`]. No press. Approaches that differ between presses. An
-    /// error of place that is negative or NaN.
+    /// Those of [`Self::search_with_progress`], and errors if there is no press, approaches differ
+    /// between presses, or the position error is negative or NaN.
     pub fn search_scan(
         &self,
         scan: &Scan,
@@ -228,13 +231,13 @@ impl InclusionSearch {
         progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<InclusionEstimate, ElasticityError> {
         let interfaces = self.specimen.interfaces();
-        // Per interface: a homogeneous fit, the grid, two first fits, the answer's.
+        // Per contact condition: a homogeneous fit, the grid, two first fits and the final fit.
         let mut counter = Counter::new(interfaces.len() * 55, progress);
         let blocks: Vec<HomogeneousFit> = (interfaces.into_iter())
             .filter_map(|face| self.homogeneous(observed, approaches_m, face, &mut counter))
             .collect();
-        // Where the homogeneous block that fits better needs no inclusion, one would make up for a
-        // wrong assumption about the face.
+        // If the better-fitting homogeneous block needs no inclusion, an inclusion in the other
+        // would compensate for a wrong assumption about the face.
         let best = (blocks.iter()).max_by(|a, b| a.fit.evidence.total_cmp(&b.fit.evidence));
         let is_homogeneous = best.is_some_and(HomogeneousFit::is_homogeneous);
         let mut candidates: Vec<FirstFits> = Vec::new();
@@ -288,7 +291,7 @@ impl InclusionSearch {
         Ok(best.estimate(observed, rival.as_ref(), is_unsolved))
     }
 
-    /// The values of all presses, and the approaches of each.
+    /// The values of all presses, with the approaches of each.
     pub(crate) fn observed_scan(
         &self,
         scan: &Scan,
@@ -326,7 +329,7 @@ impl InclusionSearch {
             let mean = frame.pressure_pa.iter().sum::<f64>() / frame.pressure_pa.len() as f64;
             let expected = mean * area;
             values.push(frame.force_n.unwrap_or(expected));
-            // A force that is not known weighs nothing.
+            // An unknown force has no weight.
             white.push(if frame.force_n.is_some() {
                 0.0
             } else {
@@ -386,11 +389,11 @@ impl InclusionSearch {
         }
     }
 
-    /// What is known of the block. `guess` of its modulus counts where nobody has said it.
+    /// Priors of the block. `guess` is used for its modulus if none is stated.
     pub(crate) fn block_priors(&self, guess: f64) -> Vec<Prior> {
         let [height, zero, (poisson_ratio, error)] = self.specimen.known();
         let poisson = (poisson_ratio.min(LARGEST_POISSON_RATIO), error);
-        // Three decades each way.
+        // Three decades on either side.
         let modulus = self.specimen.block_modulus().unwrap_or((guess.ln(), 3.5));
         vec![
             Prior::new(Coordinate::BlockModulus, modulus),
@@ -400,9 +403,9 @@ impl InclusionSearch {
         ]
     }
 
-    /// Sizes, depths and contrasts that a face of this radius can see. These are D from 0.2 to 2
-    /// radii, d from 0.06 to 1.5, E₁ from 0.4 to 47 times E₀, as 95 % ranges. And what is known of
-    /// the shape, where it is not a ball's for certain.
+    /// Priors of the sizes, depths and contrasts that a face of this radius can detect. The 95 %
+    /// ranges are 0.2 to 2 radii for D, 0.06 to 1.5 radii for d, and 0.4 to 47 times E₀ for E₁. The
+    /// shape has a prior unless it is certainly a ball.
     pub(crate) fn lump_priors(&self, block_modulus_pa: f64) -> Vec<Prior> {
         let face = self.guide.radius_m();
         let mut priors = vec![
@@ -419,8 +422,9 @@ impl InclusionSearch {
         priors
     }
 
-    /// Where an inclusion may lie, where that shows: under the face, with axes up to 1.75 : 1 in
-    /// two of three. And how far presses may have been from where they are said to have been.
+    /// Priors of the inclusion's position, if it is observable: under the face, with axes up to
+    /// 1.75 : 1 in two of three cases. Also priors of the deviations of presses from their stated
+    /// positions.
     fn place_priors(&self, observed: &Observed) -> Vec<Prior> {
         let Some(cells) = &observed.cells else {
             return Vec::new();
@@ -467,37 +471,37 @@ impl InclusionSearch {
     }
 }
 
-/// Elements along an eighth of the inclusion's circumference for the answer. Of bonded blocks the
-/// pressure is within 0.05 % of a mesh of ten. Five leave waves of 0.1 % above a wide shallow
-/// inclusion, which move its size and depth by one bound. Where the face slides they move χ² by up
-/// to ten, enough to take it for one that sticks. On an inclusion that hardly shows the noise errs
-/// by more than five elements do.
+/// Elements along an eighth of the inclusion's circumference for the final fit. For bonded blocks
+/// the pressure is within 0.05 % of that of a mesh with ten. Five elements leave waves of 0.1 %
+/// above a wide shallow inclusion, which change its size and depth by one bound. On a sliding face
+/// they change χ² by up to ten, which is enough to mistake it for a bonded one. For a barely
+/// detectable inclusion, the noise exceeds the error of five elements.
 pub(crate) fn answer_fineness(is_certain: bool) -> usize {
     if is_certain { 7 } else { 5 }
 }
 
 /// A homogeneous block under one assumption about the face.
 pub(crate) struct HomogeneousFit {
-    /// Of the first fits.
+    /// Problem of the first fits.
     pub problem: Problem,
     pub interface: Interface,
     pub fit: Fit,
-    /// The fit on the answer's mesh and what inclusions are predicted to add to it, where the block
-    /// may be plain.
+    /// The fit on the final mesh with the predicted contributions of inclusions. `None` if the
+    /// block cannot be plain.
     pub settled: Option<(Fit, Score)>,
     pub grid: Vec<GridStart>,
-    /// Small strain on the plain block as it is known, which the grid is solved by.
+    /// Small strain on the plain block with its prior parameters, used to solve the grid.
     pub linear: Forward,
     pub known: Parameters,
 }
 
 impl HomogeneousFit {
-    /// Whether inclusions can be ruled out, were the face as assumed.
+    /// Whether inclusions can be ruled out if the face is as assumed.
     pub(crate) fn is_homogeneous(&self) -> bool {
         (self.settled.as_ref()).is_some_and(|(_, score)| score.is_homogeneous())
     }
 
-    /// Starts with their pressures scaled to those observed, the best first.
+    /// Starts with pressures scaled to those observed, the best first.
     pub(crate) fn starts(&self) -> Vec<Parameters> {
         let mut scaled: Vec<(f64, Parameters)> = (self.grid.iter())
             .filter_map(|start| (self.problem).scaled_start(&start.parameters, &start.predicted))
@@ -508,7 +512,7 @@ impl HomogeneousFit {
 }
 
 impl InclusionSearch {
-    /// The fit of a homogeneous block. `None` where it could not be solved.
+    /// Fits a homogeneous block. `None` if it could not be solved.
     pub(crate) fn homogeneous(
         &self,
         observed: &Observed,
@@ -528,8 +532,8 @@ impl InclusionSearch {
         let block = self.known_block(guess);
         let (_, start) = problem.scaled_start(&block, &forward.predict(&block)?)?;
         let fit = problem.fit(&start, FIRST_FIT_ENDING, || counter.step())?;
-        // A homogeneous block that fits an inclusion's pressures is bent out of what is known of
-        // it; starts are not.
+        // A homogeneous block that fits the pressures of an inclusion has parameters far from their
+        // priors; the starts must not.
         let mut known = self.known_block(fit.parameters.block_modulus_pa);
         problem.forward = problem.forward.with_plain(&known)?;
         if let Some(cells) = &problem.forward.cells {
@@ -558,8 +562,8 @@ impl InclusionSearch {
         })
     }
 
-    /// The homogeneous block's fit on the answer's mesh, and what inclusions are predicted to add
-    /// to it.
+    /// The fit of the homogeneous block on the final mesh, and the predicted contributions of
+    /// inclusions.
     fn settled(
         &self,
         problem: &Problem,
@@ -574,7 +578,7 @@ impl InclusionSearch {
         Some((fit, score))
     }
 
-    /// A problem of first fits on the answer's mesh, with the errors that are left there.
+    /// A first-fit problem transferred to the final mesh, with the errors of that mesh.
     pub(crate) fn on_answers_mesh(
         &self,
         problem: &Problem,
@@ -592,35 +596,35 @@ impl InclusionSearch {
         })
     }
 
-    /// Modulus of a homogeneous block by the mean pressure over the mean strain: right within a
-    /// factor of three, from which the fit of ln E₀ converges.
+    /// Modulus of a homogeneous block from mean pressure over mean strain: accurate to a factor of
+    /// three, from where the fit of ln E₀ converges.
     fn stiffness(&self, observed: &Observed, approaches_m: &[f64]) -> f64 {
         let rings = observed.radii_m.len();
         let last = observed.frames - 1;
         let pressures = &observed.values[last * rings..observed.frames * rings];
         let mean = pressures.iter().sum::<f64>() / rings as f64;
         let strain = approaches_m[last] / self.specimen().height_m();
-        // Below a pascal there is no contact; the fit will say so by its misfit.
+        // Below one pascal there is no contact, and the misfit of the fit will reveal this.
         (0.5 * mean / strain).max(1.0)
     }
 }
 
 /// The best first fits under one assumption about the face.
 ///
-/// Their covariance has the coarse mesh's error in it: without, the objective is as rough as that,
-/// and fits end far from the truth.
+/// Their covariance includes the error of the coarse mesh. Without it the objective would be as
+/// rough as this error, and fits would end far from the truth.
 pub(crate) struct FirstFits {
     problem: Problem,
     interface: Interface,
     homogeneous: Fit,
-    /// The homogeneous block's fit on the answer's mesh, where it may be one.
+    /// The fit of the homogeneous block on the final mesh, if the block may be homogeneous.
     settled: Option<Fit>,
     score: Option<Score>,
     lump: Option<Fit>,
 }
 
 impl FirstFits {
-    /// Without an inclusion.
+    /// First fits without an inclusion.
     pub(crate) fn homogeneous(homogeneous: HomogeneousFit) -> Self {
         let (settled, score) = homogeneous.settled.unzip();
         Self {
@@ -637,20 +641,20 @@ impl FirstFits {
         better(&self.homogeneous, self.lump.as_ref())
     }
 
-    /// Log evidence of the better fit.
+    /// Log-evidence of the better fit.
     pub(crate) fn evidence(&self) -> f64 {
         self.better().evidence
     }
 
-    /// Log evidence of the first fits below which another assumption about the face is given up.
+    /// Log-evidence of the first fits below which another assumption about the face is discarded.
     fn hopeless(&self) -> f64 {
         self.evidence() - HOPELESS_EVIDENCE - HOPELESS_MISFIT * self.better().misfit
     }
 }
 
 impl InclusionSearch {
-    /// The best first fits with an inclusion, from the grid's best starts and from what fits best
-    /// under `another` assumption.
+    /// The best first fits with an inclusion, from the best starts of the grid and from the best
+    /// fit under `another` assumption.
     fn first_fits(
         &self,
         observed: &Observed,
@@ -681,8 +685,8 @@ impl InclusionSearch {
         first_fits
     }
 
-    /// First fits on the answer's mesh, in full where their log evidence exceeds `needed`.
-    /// `None` where the homogeneous block's could not be solved.
+    /// Repeats the first fits on the final mesh, in full if their log-evidence exceeds `needed`.
+    /// `None` if the homogeneous block could not be solved.
     pub(crate) fn hypothesis(
         &self,
         observed: &Observed,

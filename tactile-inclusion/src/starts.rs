@@ -1,28 +1,28 @@
-//! Inclusions that fits start from.
+//! Starting values of inclusions for the fits.
 
 use crate::forward::Forward;
 use crate::parameters::{LumpParameters, Parameters};
 use crate::progress::Counter;
 
-/// Part of the block's height that an inclusion may reach down to.
+/// Fraction of the block's height to which an inclusion may extend.
 const DEEPEST: f64 = 0.95;
 
-/// Diameters and depths over the face's radius, and contrasts E₁/E₀, that a face can see.
+/// Diameters and depths relative to the face radius, and contrasts E₁/E₀, that a face can detect.
 pub(crate) const DIAMETERS: [f64; 3] = [0.35, 0.65, 1.05];
 pub(crate) const DEPTHS: [f64; 3] = [0.15, 0.3, 0.55];
 const CONTRASTS: [f64; 2] = [2.5, 8.0];
 
-/// An inclusion in a block, and its pressures.
+/// An inclusion in a block, with its pressures.
 #[derive(Debug, Clone)]
 pub(crate) struct GridStart {
     pub parameters: Parameters,
     pub predicted: Vec<f64>,
-    /// Part by which each value exceeds that of a homogeneous block on the same mesh.
+    /// Relative excess of each value over that of a homogeneous block on the same mesh.
     pub added: Vec<f64>,
 }
 
-/// The grid of inclusions in a homogeneous block under a face of this radius. `None` where the
-/// search is to end.
+/// The grid of inclusions in a homogeneous block under a face of this radius. `None` if the search
+/// was cancelled.
 pub(crate) fn starts(
     forward: &Forward,
     homogeneous: &Parameters,

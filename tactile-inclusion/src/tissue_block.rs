@@ -1,12 +1,9 @@
-//! What is known of a block before it is pressed.
-//!
-//! Measured pressures over the radius.
+//! Prior knowledge of a block, and measured pressure profiles.
 
 use tactile_elasticity::{ElasticityError, Quantity};
 use tactile_fem::{Interface, Material};
 
-/// A cylindrical block of tissue on a rigid stage: what is known of it before it is pressed, each
-/// with its standard error.
+/// A cylindrical block of tissue on a rigid stage: prior values, each with its standard error.
 ///
 /// ```
 /// use tactile_fem::Interface;
@@ -36,12 +33,12 @@ pub struct TissueBlock {
 }
 
 impl TissueBlock {
-    /// Height and radius in metres. The height's standard error is 2 %, Poisson's ratio 0.495 ±
-    /// 0.005, and the zero of the approaches is known to 20 µm, until set. Whether the face sticks
-    /// or slides is not known.
+    /// Creates the block from its height and radius in metres. The defaults are: 2 % standard error
+    /// of the height, a Poisson ratio of 0.495 ± 0.005, and an error of 20 µm of the approach zero.
+    /// Whether the face sticks or slides is unknown.
     ///
     /// # Errors
-    /// A length that is not positive.
+    /// An error for a length that is not positive.
     pub fn new(height_m: f64, radius_m: f64) -> Result<Self, ElasticityError> {
         Quantity::Thickness.positive(height_m)?;
         Quantity::Radius.positive(radius_m)?;
@@ -60,7 +57,7 @@ impl TissueBlock {
     /// Sets the height's standard error, in metres.
     ///
     /// # Errors
-    /// Not positive.
+    /// An error for a value that is not positive.
     pub fn with_height_error_m(mut self, error_m: f64) -> Result<Self, ElasticityError> {
         self.height_error_m = Quantity::StandardError.positive(error_m)?;
         Ok(self)
@@ -69,7 +66,8 @@ impl TissueBlock {
     /// Sets Poisson's ratio of tissue and inclusion, at most 0.4999, and its standard error.
     ///
     /// # Errors
-    /// A ratio that finite elements do not take. An error that is not positive.
+    /// An error for a ratio that the finite elements do not support, or an error that is not
+    /// positive.
     pub fn with_poisson_ratio(mut self, value: f64, error: f64) -> Result<Self, ElasticityError> {
         Material::new(1.0, value)?;
         self.poisson_ratio = value;
@@ -80,17 +78,17 @@ impl TissueBlock {
     /// Sets the standard error of the zero of all approaches, in metres.
     ///
     /// # Errors
-    /// Not positive.
+    /// An error for a value that is not positive.
     pub fn with_approach_error_m(mut self, error_m: f64) -> Result<Self, ElasticityError> {
         self.approach_error_m = Quantity::StandardError.positive(error_m)?;
         Ok(self)
     }
 
-    /// Sets the tissue's Young's modulus and its standard error, in pascals. Both are fitted from
-    /// scratch where it is not set.
+    /// Sets the tissue's Young's modulus and its standard error, in pascals. Without it the modulus
+    /// is fitted without prior knowledge.
     ///
     /// # Errors
-    /// Not positive.
+    /// An error for a value that is not positive.
     pub fn with_youngs_modulus(
         mut self,
         value_pa: f64,
@@ -102,7 +100,7 @@ impl TissueBlock {
         Ok(self)
     }
 
-    /// Says whether the guide's face sticks to the block or slides on it.
+    /// Sets whether the guide's face sticks to the block or slides on it.
     pub fn with_interface(mut self, interface: Interface) -> Self {
         self.interface = Some(interface);
         self
@@ -133,7 +131,7 @@ impl TissueBlock {
         }
     }
 
-    /// Means and standard errors of ln H, the approach's zero and ν.
+    /// Means and standard errors of ln H, the approach zero and ν.
     pub(crate) fn known(&self) -> [(f64, f64); 3] {
         [
             (self.height_m.ln(), self.height_error_m / self.height_m),
@@ -143,7 +141,7 @@ impl TissueBlock {
     }
 }
 
-/// Errors of a sensor's pressure that are smooth over its face, and of its force.
+/// Smooth errors of a sensor's pressure over its face, and the error of its force.
 ///
 /// ```
 /// use tactile_inclusion::SensorErrors;
@@ -153,22 +151,23 @@ impl TissueBlock {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensorErrors {
-    /// Relative standard error of the pressure that all frames share: the calibration's.
+    /// Relative standard error of the pressure common to all frames, from the calibration.
     pub common: f64,
-    /// Relative standard error that each frame has of its own.
+    /// Relative standard error specific to each frame.
     pub each_frame: f64,
     /// Length over which both are correlated, in metres (Matérn's kernel of order 3/2).
     pub correlation_m: f64,
     /// Relative standard error of the force.
     pub force: f64,
-    /// Part of the finite elements' own error (how far another code's pressures are off) that
-    /// counts: 1. 0 for what the sensor alone would leave open, as in published bounds.
+    /// Fraction of the finite elements' own error (the deviation from another code) that is
+    /// included: 1. With 0 the result contains only the uncertainty of the sensor, as in published
+    /// bounds.
     pub model: f64,
 }
 
 impl Default for SensorErrors {
-    /// 0.3 % in common and 0.1 % of each frame, correlated over 3 mm. 0.1 % of the force. And the
-    /// model's error.
+    /// 0.3 % in common and 0.1 % for each frame, correlated over 3 mm; 0.1 % of the force; and the
+    /// error of the model.
     fn default() -> Self {
         Self {
             common: 3e-3,
@@ -191,7 +190,7 @@ impl SensorErrors {
     }
 }
 
-/// Mean pressure in rings around the axis, of one frame.
+/// Mean pressure in rings around the axis, for one frame.
 ///
 /// ```
 /// use tactile_inclusion::PressureProfile;
@@ -206,17 +205,18 @@ impl SensorErrors {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressureProfile {
-    /// How far the guide was pressed into the block, in metres.
+    /// Displacement of the guide into the block, in metres.
     pub approach_m: f64,
-    /// Force on the guide in newtons, where it is known.
+    /// Force on the guide in newtons. `None` if unknown.
     pub force_n: Option<f64>,
     /// Mean pressure of each ring, in pascals.
     pub pressure_pa: Vec<f64>,
-    /// White error of each ring's mean in pascals: a pixel's over the root of their number.
+    /// White error of each ring's mean in pascals: that of a pixel over the root of the pixel
+    /// count.
     pub standard_error_pa: Vec<f64>,
 }
 
-/// Checks that there are approaches, positive and growing.
+/// Checks that there are approaches, and that they are positive and increasing.
 pub(crate) fn check_approaches(
     approaches_m: impl Iterator<Item = f64>,
 ) -> Result<(), ElasticityError> {
@@ -230,7 +230,7 @@ pub(crate) fn check_approaches(
     Quantity::Distance.growing(approaches_m)
 }
 
-/// Checks frames against the rings' radii.
+/// Checks frames against the radii of the rings.
 pub(crate) fn check(radii_m: &[f64], frames: &[PressureProfile]) -> Result<(), ElasticityError> {
     check_approaches(frames.iter().map(|frame| frame.approach_m))?;
     for &radius in radii_m {

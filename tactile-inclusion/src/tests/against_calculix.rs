@@ -1,7 +1,7 @@
-//! The forward model against CalculiX, an independent finite-element program.
+//! Compares the forward model with CalculiX, an independent finite-element program.
 //!
-//! `tests/data/inclusion_calculix.csv` is what `evidence/inclusion_scenes.py` finds, with elements
-//! of `size_mm`: a row a load.
+//! `tests/data/inclusion_calculix.csv` holds the results of `evidence/inclusion_scenes.py` with
+//! elements of `size_mm`, one row per load.
 #![allow(clippy::print_stdout)]
 
 use super::{block, forward, lump, search};
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use tactile_fem::{Guide, GuideLayer, Interface, Material};
 
-/// A block at one approach: what predicts it, and what CalculiX finds.
+/// A block at one approach: the model's input and CalculiX's results.
 struct Load {
     scene: String,
     forward: Forward,
@@ -79,27 +79,27 @@ fn pressures_within_three_quarters_of_the_face_are_those_of_calculix() {
         for ((found, expected), radius) in pressures.iter().zip(&load.pressures_pa).zip(radii) {
             let error = found / expected - 1.0;
             println!("{} r {radius:.4} {:+.2} %", load.scene, 100.0 * error);
-            // 0.2 % by CalculiX's mesh (its pressures fall by 0.15 % from elements of 1 mm to 0.6
-            // mm), 0.1 % by this one's.
+            // 0.2 % from CalculiX's mesh (its pressures fall by 0.15 % from elements of 1 mm to 0.6
+            // mm), and 0.1 % from the model's mesh.
             assert!(error.abs() < 5e-3, "{} at {radius}: {error}", load.scene);
         }
-        // Most of it sits at the rim, which both resolve by halves.
+        // Most of the difference arises at the rim, which both meshes resolve only partly.
         let error = force[0] / load.force_n - 1.0;
         println!("{} force {:+.2} %", load.scene, 100.0 * error);
         assert!(error.abs() < 1e-2, "{}: {error}", load.scene);
     }
 }
 
-/// Pressures from 11 mm on the one side of the axis to 11 mm on the other, every millimetre, in Pa:
-/// `evidence/inclusion_pictures.py` with a ball of 10 mm and 25 kPa in 5 kPa, 6 mm deep and 5 mm
-/// aside, at an approach of 3 mm.
+/// Pressures in Pa at every millimetre from −11 mm to 11 mm across the axis, by
+/// `evidence/inclusion_pictures.py`: a ball of 10 mm and 25 kPa in tissue of 5 kPa, 6 mm deep and 5
+/// mm off the axis, at an approach of 3 mm.
 const ASIDE_PA: [f64; 23] = [
     979.0, 952.0, 942.0, 931.0, 918.0, 908.0, 905.0, 912.0, 928.0, 954.0, 992.0, 1040.0, 1098.0,
     1162.0, 1222.0, 1269.0, 1295.0, 1294.0, 1268.0, 1225.0, 1176.0, 1136.0, 1115.0,
 ];
 
-/// Root mean square of what CalculiX's pressure above a lump off the axis is over the model's, with
-/// a common factor left free: its coarse mesh is up to a percent too stiff.
+/// Root mean square deviation of CalculiX's pressure above an off-axis lump from the model's, with
+/// a free common factor: its coarse mesh is up to a per cent too stiff.
 fn off_calculix(place: Place) -> f64 {
     let positions_m: Vec<[f64; 2]> = (-11..12).map(|x| [1e-3 * f64::from(x), 0.0]).collect();
     let parameters = Parameters {
@@ -141,9 +141,9 @@ fn a_lump_off_the_axis_shows_where_calculix_has_it() {
     let law = search().known_block(5e3).place;
     let by_law = off_calculix(law);
     println!("{:.2} % by the law of the load's spread", 100.0 * by_law);
-    // 0.2 % of it is the scatter of CalculiX's elements.
+    // 0.2 % of this is the scatter of CalculiX's elements.
     assert!(by_law < 5e-3, "{by_law}");
-    // As if the load did not spread, and as if the lump stayed where it is.
+    // If the load did not spread, and if the lump did not move.
     for other in [
         Place { spread: 0.0, ..law },
         Place {

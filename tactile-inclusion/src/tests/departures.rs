@@ -1,4 +1,5 @@
-//! Blocks that are not as the model assumes: an answer with its flag, never a confident wrong one.
+//! Blocks that violate the assumptions of the model: the result must carry a warning and never be
+//! confidently wrong.
 
 use super::{block, forward, guide, is_poor, lump, search, specimen};
 use crate::forward::Forward;
@@ -13,7 +14,7 @@ use tactile_fem::{Guide, GuideLayer, Interface, Material};
 const RINGS: usize = 24;
 const APPROACHES_M: [f64; 2] = [1.5e-3, 3e-3];
 
-/// Pressures of the frames at `radii_m`, one frame after the other, then the forces.
+/// Pressures of the frames at `radii_m`, frame by frame, then the forces.
 fn solved(interface: Interface, lump: Option<LumpParameters>, radii_m: &[f64]) -> Vec<f64> {
     let forward = Forward {
         interface,
@@ -29,7 +30,7 @@ fn solved(interface: Interface, lump: Option<LumpParameters>, radii_m: &[f64]) -
     forward.predict(&block).unwrap()
 }
 
-/// The same of a block with a stiffer skin, which moves with the guide as a layer of it.
+/// Like `solved`, for a block with a stiffer skin, which moves with the guide as one of its layers.
 fn under_a_skin(thickness_m: f64, modulus_pa: f64, lump: Option<LumpParameters>) -> Vec<f64> {
     let skin = GuideLayer {
         thickness_m,
@@ -51,7 +52,7 @@ fn under_a_skin(thickness_m: f64, modulus_pa: f64, lump: Option<LumpParameters>)
     forward.predict(&block).unwrap()
 }
 
-/// The same of the rings of a face that sticks.
+/// Like `solved`, for the rings of a bonded face.
 fn bonded(lump: Option<LumpParameters>) -> Vec<f64> {
     solved(Interface::Bonded, lump, &ring_radii())
 }
@@ -60,8 +61,8 @@ fn ring_radii() -> Vec<f64> {
     (0..RINGS).map(|k| (k as f64 + 0.5) * 0.5e-3).collect()
 }
 
-/// Frames with these values and the noise of pixels of 86 µm, 0.75 % each, which is not drawn: what
-/// is left of a fit is the departure alone.
+/// Frames with these values and the standard error of pixels of 86 µm with 0.75 % noise each. No
+/// noise is drawn, so the residuals of a fit come only from the violated assumption.
 fn frames(values: &[f64]) -> Vec<PressureProfile> {
     let forces = &values[2 * RINGS..];
     let rings = values[..2 * RINGS].chunks(RINGS);
@@ -90,7 +91,7 @@ fn searched_in(specimen: &TissueBlock, frames: &[PressureProfile]) -> InclusionE
     search.search(&ring_radii(), frames).unwrap()
 }
 
-/// Each parameter that is identified holds its truth.
+/// Each identified parameter covers its true value.
 fn told_is_right(estimate: &InclusionEstimate, truth: LumpParameters) -> bool {
     let Some(inclusion) = &estimate.inclusion else {
         return true;
@@ -108,8 +109,8 @@ fn told_is_right(estimate: &InclusionEstimate, truth: LumpParameters) -> bool {
     })
 }
 
-/// Ring means of the pressure that a lump adds, moved sideways by `aside_m`, on that of the plain
-/// block.
+/// Ring means of the pressure contributed by a lump that is moved sideways by `aside_m`, added to
+/// the pressure of the plain block.
 fn moved_aside(lump: LumpParameters, aside_m: f64) -> Vec<f64> {
     let fine: Vec<f64> = (0..72).map(|k| (f64::from(k) + 0.5) * 0.25e-3).collect();
     let [with, without] = [Some(lump), None].map(|lump| solved(Interface::Bonded, lump, &fine));
@@ -133,8 +134,8 @@ fn moved_aside(lump: LumpParameters, aside_m: f64) -> Vec<f64> {
     values
 }
 
-/// As assumed. And a small one of twice the tissue's modulus, which the test that ends a homogeneous
-/// block's search lets pass.
+/// The block satisfies the assumptions. A small inclusion of twice the tissue's modulus must also
+/// pass the test that ends the search of a homogeneous block.
 #[test]
 fn an_inclusion_is_found_and_the_told_is_right() {
     for truth in [lump(10e-3, 4e-3, 40e3), lump(5e-3, 8e-3, 10e3)] {
@@ -156,12 +157,12 @@ fn a_flattened_inclusion_is_not_taken_for_a_ball() {
     let [low, high] = found.height_over_width.unwrap().interval;
     assert!((low..high).contains(&truth.aspect), "{low} {high}");
     assert!(high < 1.0 && found.ball_probability < 0.01, "{found:?}");
-    // The volume's ball, which is 14 % narrower than the outline from above.
+    // The ball of equal volume is 14 % narrower than the outline from above.
     assert!(found.diameter_m.value().is_some(), "{found:?}");
 }
 
-/// A search of a homogeneous block fits no inclusion: the grid's 27 solutions and a homogeneous
-/// block's few.
+/// The search of a homogeneous block fits no inclusion: it takes only the 27 solutions of the grid
+/// and a few of a homogeneous block.
 #[test]
 fn a_plain_block_is_plain_after_a_few_solutions() {
     let frames = frames(&bonded(None));
@@ -176,8 +177,8 @@ fn a_plain_block_is_plain_after_a_few_solutions() {
     assert!(solutions < 40, "{solutions}");
 }
 
-/// One frame on soft tissue hardly tells a face that sticks from one that slides, and an inclusion
-/// is larger and softer under the wrong assumption.
+/// One frame on soft tissue hardly distinguishes a bonded from a sliding face, and an inclusion is
+/// larger and softer under the wrong assumption.
 #[test]
 fn where_a_face_may_stick_or_slide_the_intervals_hold_the_truth() {
     let truth = lump(9e-3, 4.5e-3, 50e3);
@@ -201,7 +202,7 @@ fn where_a_face_may_stick_or_slide_the_intervals_hold_the_truth() {
     let truth = [truth.diameter_m, truth.depth_m, truth.youngs_modulus_pa];
     for (k, ([low, high], truth)) in intervals(&estimate).into_iter().zip(truth).enumerate() {
         assert!((low..=high).contains(&truth), "{low} {high}");
-        // Of the same fits, but for where they start: within 2 %.
+        // Both come from the same fits with different starts: within 2 %.
         for assumed in &assumed {
             let [lower, upper] = intervals(assumed)[k];
             assert!(low < 1.02 * lower && high > upper / 1.02);
@@ -226,7 +227,7 @@ fn a_stiffer_skin_is_no_lump_and_hides_none() {
         let estimate = searched(&frames(&under_a_skin(thickness_m, skin, None)));
         assert_ne!(estimate.verdict(), SearchVerdict::Found, "{estimate:?}");
     }
-    // The depth of a lump counts from under the skin.
+    // The depth of a lump is measured from below the skin.
     let truth = lump(10e-3, 2.5e-3, 40e3);
     let estimate = searched(&frames(&under_a_skin(1.5e-3, 25e3, Some(truth))));
     assert!(
@@ -235,8 +236,8 @@ fn a_stiffer_skin_is_no_lump_and_hides_none() {
     );
 }
 
-/// A face with a radius of curvature of 60 mm, and one nearly flat. As on a bed of springs, the
-/// pressure falls with the approach that is left at a distance from the axis.
+/// A face with a radius of curvature of 60 mm, and one that is nearly flat. As on a bed of springs,
+/// the pressure decreases with the remaining approach at a distance from the axis.
 #[test]
 fn a_curved_face_is_a_poor_fit() {
     for curvature_m in [0.06, 0.3] {
@@ -256,8 +257,8 @@ fn a_curved_face_is_a_poor_fit() {
 fn forces_that_contradict_the_approaches_fit_poorly() {
     let truth = lump(10e-3, 4e-3, 40e3);
     let mut values = bonded(Some(truth));
-    // By nine times the errors of sensor and model, one way at the first frame and the other at the
-    // second.
+    // The deviation is nine times the errors of sensor and model, in opposite directions in the
+    // first and the second frame.
     values[2 * RINGS] *= 1.06;
     values[2 * RINGS + 1] *= 0.94;
     let estimate = searched(&frames(&values));
@@ -268,7 +269,7 @@ fn forces_that_contradict_the_approaches_fit_poorly() {
 fn of_an_inclusion_that_touches_the_surface_nothing_is_told() {
     let truth = lump(10e-3, 0.1e-3, 40e3);
     let estimate = searched(&frames(&bonded(Some(truth))));
-    // Its best fit leaves so much that even a lump is uncertain.
+    // Its best fit has residuals so large that even a lump is uncertain.
     assert!(
         estimate.verdict() != SearchVerdict::Absent && is_poor(&estimate),
         "{estimate:?}"

@@ -7,7 +7,7 @@ use crate::fit::{ANSWER_ENDING, Prior, Problem};
 use crate::parameters::{Coordinate, LARGEST_POISSON_RATIO, Parameters};
 use tactile_fem::Interface;
 
-/// Values without noise from a finer mesh than the fit's, with the errors of a first fit.
+/// Values without noise from a finer mesh than that of the fit, with the errors of a first fit.
 fn problem_of(truth: &Parameters, resolution: Resolution) -> Problem {
     let finer = forward(5);
     let values = finer.predict(truth).unwrap();
@@ -52,29 +52,30 @@ fn a_fit_from_afar_ends_at_the_truth_within_its_errors() {
     for (k, coordinate) in problem.coordinates().into_iter().enumerate() {
         let error = fit.covariance[(k, k)].sqrt();
         let z = (fit.parameters.get(coordinate) - truth.get(coordinate)) / error;
-        // Without noise the coarse mesh and the priors pull, whose means are not the truth.
+        // Without noise, only the coarse mesh and the priors, whose means are not the truth, shift
+        // the result.
         assert!(z.abs() < 0.7, "{coordinate:?}: {z}");
     }
-    // The covariance has the coarse mesh's error in it.
+    // The covariance includes the error of the coarse mesh.
     assert!(fit.misfit < fit.predicted.len() as f64, "{}", fit.misfit);
 }
 
 #[test]
 fn a_fit_goes_on_along_the_limit_of_poissons_ratio() {
     let (problem, truth) = problem();
-    // From the limit itself and far from the truth in all else: ν's prior and the data pull it
-    // back, but first steps go beyond the limit.
+    // The start is at the limit itself and far from the truth in all other coordinates. The prior
+    // of ν and the data pull it back, but first steps would cross the limit.
     let mut start = truth.clone();
     start.poisson_ratio = LARGEST_POISSON_RATIO;
     start.block_modulus_pa *= 0.8;
     start.lump = Some(lump(14e-3, 3e-3, 60e3));
     let fit = problem.fit(&start, ANSWER_ENDING, || true).unwrap();
     assert!(fit.converged);
-    // As of the fit from afar.
+    // The same bound as for the distant start.
     assert!(fit.misfit < fit.predicted.len() as f64, "{}", fit.misfit);
 }
 
-/// A small deep inclusion that is little stiffer than the tissue: its ridge bends.
+/// For a small deep inclusion that is slightly stiffer than the tissue, the ridge bends.
 #[test]
 fn points_of_a_ridge_are_on_it() {
     let truth = Parameters {
@@ -92,8 +93,8 @@ fn points_of_a_ridge_are_on_it() {
         });
         let normal = problem.normal(&at, None).unwrap();
         let left = problem.step(&at, &normal, 0.0, Some(ridge.index)).unwrap();
-        // What the last step, shorter than one standard error, and a mesh of its own leave; up to 4
-        // after a single step.
+        // The remaining distance comes from the last step, which was shorter than one standard
+        // error, and from a new mesh. After a single step it is up to 4.
         assert!(left.size < 0.5, "{}", left.size);
     }
 }

@@ -4,7 +4,7 @@ use crate::ridge::{Marginal, Node, Ridge};
 use nalgebra::{DMatrix, DVector};
 use statrs::function::erf::erfc;
 
-/// Nodes at these deviations of ln E₁, on which another coordinate depends linearly.
+/// Nodes at these deviations of ln E₁, with another coordinate that depends on it linearly.
 fn ridge(at: &[f64], density: impl Fn(f64) -> f64, laplace: f64) -> Ridge {
     let node = |x: &f64| Node {
         density: density(*x),
@@ -45,8 +45,8 @@ fn a_gaussian_has_its_own_interval_and_evidence() {
 
 #[test]
 fn a_ridge_that_is_open_upwards_reaches_further_there() {
-    // Falls as a Gaussian of 0.2 below and of three times that above: a quarter and three quarters
-    // of the probability.
+    // The density falls like a Gaussian of width 0.2 below and three times that above: a quarter
+    // and three quarters of the probability.
     let fall = |x: f64| {
         if x < 0.0 {
             12.5 * x * x
@@ -57,7 +57,8 @@ fn a_ridge_that_is_open_upwards_reaches_further_there() {
     let nodes = [-0.5, -0.25, 0.0, 0.6, 1.2, 1.8];
     let marginal = Marginal::new(&ridge(&nodes, |x| -fall(x), 0.0), None).unwrap();
     let [low, high] = marginal.interval(1);
-    // Where the half Gaussians leave a tenth of a quarter, and a thirtieth of three quarters.
+    // The points at which the half Gaussians leave a tenth of a quarter, and a thirtieth of three
+    // quarters.
     assert!((low + 0.2 * 1.645).abs() < 0.03, "{low}");
     assert!((high - 0.6 * 2.128).abs() < 0.06, "{high}");
     assert!((marginal.median(1) - 0.6 * 0.431).abs() < 0.03);
@@ -65,8 +66,8 @@ fn a_ridge_that_is_open_upwards_reaches_further_there() {
 
 #[test]
 fn a_ball_and_a_spheroid_count_by_their_odds() {
-    // The first coordinate is the logarithm of height over width: 0.15 ± 0.1, whatever ln E₁ is. A
-    // third one is 0.3 away with it, by a correlation of 0.8.
+    // The first coordinate is the logarithm of height over width: 0.15 ± 0.1 for any ln E₁. A third
+    // coordinate deviates by 0.3 with it, with a correlation of 0.8.
     let node = |x: f64| Node {
         density: -0.5 * x * x,
         at: DVector::from_vec(vec![0.15, x, 0.3]),
@@ -83,12 +84,13 @@ fn a_ball_and_a_spheroid_count_by_their_odds() {
     };
     let known = 0.3;
     let marginal = Marginal::new(&ridge, Some((0, known))).unwrap();
-    // p(0) afterwards over beforehand.
+    // p(0) of the posterior over that of the prior.
     let odds = f64::exp(-0.5 * 1.5f64.powi(2)) * known / 0.1;
     assert!((marginal.ball - odds / (1.0 + odds)).abs() < 1e-6);
-    // Half of both evidences, of which the spheroid's is one up to the quadrature's 3 %.
+    // Half the sum of both evidences. That of the spheroid is one, up to 3 % of the quadrature.
     assert!((marginal.gain - (0.5 * (1.0 + odds)).ln()).abs() < 0.03);
-    // A ball's mean is lower by 1.6 times what the shape is away by, its variance by 1.6 × 0.016.
+    // The mean of a ball is lower by 1.6 times the deviation of the shape, and its variance by 1.6
+    // × 0.016.
     let ball = marginal.ball;
     let variance = 0.04 - 0.0256 * ball + ball * (1.0 - ball) * 0.24f64.powi(2);
     assert!((marginal.covariance()[(2, 2)] - variance).abs() < 1e-6);

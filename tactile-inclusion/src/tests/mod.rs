@@ -1,4 +1,4 @@
-//! The forward model and its derivatives, and what a search refuses.
+//! The forward model and its derivatives, and the input that a search rejects.
 
 use crate::forward::Forward;
 use crate::parameters::Place;
@@ -29,7 +29,7 @@ fn specimen() -> TissueBlock {
     TissueBlock::new(30e-3, 40e-3).unwrap()
 }
 
-/// A search of a block that the face sticks to.
+/// A search of a block bonded to the face.
 fn search() -> InclusionSearch {
     InclusionSearch::new(specimen().with_interface(Interface::Bonded), guide()).unwrap()
 }
@@ -69,7 +69,7 @@ fn is_poor(estimate: &InclusionEstimate) -> bool {
     estimate.warnings.iter().any(poor)
 }
 
-/// Largest difference over the largest value.
+/// Largest difference relative to the largest value.
 fn distance(a: &[f64], b: &[f64]) -> f64 {
     let largest = b.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     let differences = a.iter().zip(b).map(|(a, b)| (a - b).abs());
@@ -87,13 +87,13 @@ const COORDINATES: [Coordinate; 8] = [
     Coordinate::Height,
 ];
 
-/// How far derivatives are from difference quotients of solutions on the same mesh, moved.
+/// Deviations of the derivatives from difference quotients of solutions on the same moved mesh.
 fn derivative_errors(model: &Forward, here: &Parameters) -> Vec<(Coordinate, f64)> {
     let (_, solved) = model.predict_near(here, None).unwrap();
     let columns = model.derivatives(here, &COORDINATES, &solved).unwrap();
     let error = |column: &[f64], coordinate| {
-        // The truncation error of a central quotient is of the step's square, the solutions'
-        // tolerance is a hundred times below the difference.
+        // The truncation error of a central quotient is of second order in the step. The tolerance
+        // of the solutions is a hundred times below the difference.
         let step = 200.0 * here.small_step(coordinate).abs();
         let at = |by| {
             let moved = here.moved(coordinate, by);
@@ -112,8 +112,8 @@ fn derivative_errors(model: &Forward, here: &Parameters) -> Vec<(Coordinate, f64
 
 #[test]
 fn derivatives_are_those_of_solutions_at_changed_parameters() {
-    // Near the limit of ν the bulk modulus is 160 times Young's: what a difference quotient leaves
-    // of second order grows with it.
+    // Near the limit of ν the bulk modulus is 160 times Young's modulus, and the second-order error
+    // of a difference quotient grows with it.
     for (poisson_ratio, tolerance) in [(0.45, 2e-4), (0.495, 1e-3), (0.498, 2e-3)] {
         let here = Parameters {
             poisson_ratio,
@@ -135,9 +135,9 @@ fn derivatives_without_friction_know_how_the_face_slides() {
         ..forward(2)
     };
     for (coordinate, error) in derivative_errors(&model, &block()) {
-        // Faces of the solutions meet within 2e-6 of the radius, which a quotient by ν, whose step
-        // is the smallest, shows as a percent. Left out, sliding would change the derivative by ν
-        // by 8 %.
+        // The faces of the solutions meet within 2e-6 of the radius, which appears as one per cent
+        // in a quotient by ν, whose step is the smallest. Without the sliding, the derivative by ν
+        // would change by 8 %.
         let tolerance = match coordinate {
             Coordinate::PoissonRatio => 0.02,
             _ => 0.004,
@@ -161,7 +161,7 @@ fn a_moved_mesh_is_as_good_as_a_new_one() {
             let there = here.moved(coordinate, by);
             let moved = model.predict_near(&there, Some(&solved)).unwrap().0;
             let new = model.predict(&there).unwrap();
-            // The roughness that first fits count with.
+            // The roughness included in the errors of first fits.
             let off = distance(&moved[..32], &new[..32]);
             assert!(off < 8e-3, "{coordinate:?} by {by}: {off}");
             assert!(moved != new, "{coordinate:?}: the mesh was built anew");
@@ -173,15 +173,16 @@ fn a_moved_mesh_is_as_good_as_a_new_one() {
 fn the_answers_mesh_is_fine_enough() {
     let answers = forward(5).predict(&block()).unwrap();
     let finer = forward(8).predict(&block()).unwrap();
-    // The model's error that the fit counts with: 0.2 % of scale, 0.07 % of shape.
+    // The model error included in the fit: 0.2 % of scale, 0.07 % of shape.
     assert!(distance(&answers[..32], &finer[..32]) < 2e-3);
-    // Half of the force's error: the rim's singular traction.
+    // Half of the force error, from the singular traction at the rim.
     assert!(distance(&answers[32..], &finer[32..]) < 3e-3);
 }
 
 #[test]
 fn a_block_said_to_be_incompressible_is_fitted_at_the_limit() {
-    // A prior beyond the limit, narrow against the distance, would pull against every step.
+    // A prior above the limit that is narrow compared with its distance would pull against every
+    // step.
     let specimen = specimen().with_poisson_ratio(0.4999, 1e-4).unwrap();
     let search = InclusionSearch::new(specimen, guide()).unwrap();
     let start = search.known_block(5e3);
@@ -258,7 +259,7 @@ fn more_frames_tell_more_of_an_inclusion() {
 fn what_is_not_known_within_a_quarter_both_ways_is_not_told() {
     let within = |down, up| crate::Estimated::within(2f64.ln(), [2f64.ln() - down, 2f64.ln() + up]);
     let estimated = |error: f64| within(1.96 * error, 1.96 * error);
-    // The last reaches as far, but upwards alone.
+    // The last interval is equally wide, but only upwards.
     for (estimated, is_reliable, is_told) in [
         (estimated(0.1), true, true),
         (estimated(0.1), false, false),

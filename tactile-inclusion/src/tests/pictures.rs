@@ -1,4 +1,4 @@
-//! Searches from the whole face: a lump off the axis, and what no single ball explains.
+//! Searches from the whole face: an off-axis lump, and pictures that no single ball explains.
 
 use super::{is_poor, lump, search};
 use crate::forward::Forward;
@@ -14,7 +14,8 @@ use rand_distr::StandardNormal;
 use std::sync::Arc;
 
 const APPROACHES_M: [f64; 2] = [1.5e-3, 3e-3];
-/// White error over the pressure, which is not drawn: what is left of a fit is the departure alone.
+/// White error relative to the pressure. No noise is drawn, so the residuals of a fit come only
+/// from the violated assumption.
 const NOISE: f64 = 1e-3;
 
 /// Cells of 1.5 mm within three quarters of the face's radius.
@@ -84,7 +85,7 @@ fn derivatives_by_the_place_are_those_of_the_pressure() {
         .derivatives(&parameters, &coordinates, &solved)
         .unwrap();
     for (coordinate, column) in coordinates.into_iter().zip(columns) {
-        // A place has no error of the elements, but kinks where the ratio ends.
+        // A position has no element error, but there are kinks where the ratio ends.
         let part = match coordinate {
             Coordinate::Diameter
             | Coordinate::Depth
@@ -102,7 +103,8 @@ fn derivatives_by_the_place_are_those_of_the_pressure() {
         let largest = column.iter().fold(0.0f64, |most, d| most.max(d.abs()));
         for ((high, low), derivative) in high.iter().zip(&low).zip(&column) {
             let difference = (high - low) / (2.0 * step);
-            // Forward differences of 1e-5 err by as much, central ones by their step's square.
+            // Forward differences have an error of 1e-5, and central ones an error of second order
+            // in their step.
             let error = (difference - derivative).abs() / largest;
             assert!(error < 1e-2, "{coordinate:?}: {difference} {derivative}");
         }
@@ -124,7 +126,7 @@ fn under_the_axis_the_picture_is_the_axial_pressure() {
     }
 }
 
-/// Frames with these pressures, one after the other.
+/// Frames with these pressures, frame by frame.
 fn frames(values: &[f64]) -> Vec<PressureProfile> {
     let frames = values.chunks(positions().len()).zip(APPROACHES_M);
     frames
@@ -141,7 +143,7 @@ fn go_on(_: Progress) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// What is found from these pressures of all frames.
+/// Result of a search with these pressures of all frames.
 fn searched(values: &[f64]) -> InclusionEstimate {
     let press = ScanPress {
         axis_m: [0.0; 2],
@@ -155,9 +157,9 @@ fn searched(values: &[f64]) -> InclusionEstimate {
     search().search_scan(&scan, &mut go_on).unwrap()
 }
 
-/// Presses of a scan with an inclusion, the first two over it and the third far from it. They were
-/// not quite where they were said to be, touch was not quite where it was said to be, and the
-/// pressures are noisy.
+/// Presses of a scan with an inclusion, the first two above it and the third far from it. The
+/// positions and the first touch deviate slightly from the stated values, and the pressures are
+/// noisy.
 fn scan(parameters: &Parameters, seed: u64) -> Scan {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut normal = move |error: f64| error * rng.sample::<f64, _>(StandardNormal);
@@ -221,11 +223,11 @@ fn a_scan_finds_an_inclusion_between_its_presses() {
             assert!((error - 1.0).abs() < 0.15, "{told:?}");
         }
     }
-    // Of 15 intervals of 95 % three or more miss in 4 of 100 draws, and χ² of six degrees of
-    // freedom exceeds 16.8 in one.
+    // Of 15 intervals of 95 %, three or more miss in 4 of 100 draws, and χ² with six degrees of
+    // freedom exceeds 16.8 in one of 100.
     assert!(missed < 3 && squares < 16.8, "{missed} {squares}");
 
-    // Of the press that is far from it, nothing.
+    // The press far from the inclusion alone shows nothing.
     let whole = scan(&parameters, 1);
     let with = |presses: &[ScanPress], position_error_m| Scan {
         presses: presses.to_vec(),
@@ -234,7 +236,7 @@ fn a_scan_finds_an_inclusion_between_its_presses() {
     let alone = search().search_scan(&with(&whole.presses[2..], 0.2e-3), &mut go_on);
     assert_eq!(alone.unwrap().verdict(), SearchVerdict::Absent);
 
-    // Approaches that differ, and a place that is nowhere.
+    // Different approaches, and a position that is not a number, are rejected.
     let refused = |scan: &Scan| assert!(search().search_scan(scan, &mut go_on).is_err());
     let mut other = whole.clone();
     other.presses[1].frames[0].approach_m = 1.4e-3;
@@ -246,7 +248,7 @@ fn a_scan_finds_an_inclusion_between_its_presses() {
     refused(&with(&[], 0.0));
 }
 
-/// That this is the block's inclusion at this place.
+/// Asserts that this is the block's inclusion, at this position.
 fn assert_found(inclusion: &Inclusion, place_m: [f64; 2]) {
     let [x, y] = inclusion.position_m.unwrap();
     let away = (x.value - place_m[0]).hypot(y.value - place_m[1]);
@@ -269,7 +271,8 @@ fn two_balls_off_the_axis_are_told_apart_and_three_are_not_explained() {
     let forward = forward(5).with_plain(&parameters).unwrap();
     let one = forward.predict(&parameters).unwrap();
     let count = 2 * positions().len();
-    // A second one on the other side, 1.3 diameters away, each lifting the pressure as if alone.
+    // A second inclusion on the other side, 1.3 diameters away. Each raises the pressure as if it
+    // were alone.
     parameters.place.centre_m = [-7.5e-3, 2.5e-3];
     let other = forward.predict(&parameters).unwrap();
     let without = Parameters {
@@ -288,7 +291,7 @@ fn two_balls_off_the_axis_are_told_apart_and_three_are_not_explained() {
     assert_found(&two[0], [5e-3, -2e-3]);
     assert_found(&two[1], [-7.5e-3, 2.5e-3]);
 
-    // Three are neither one nor two.
+    // Three inclusions are neither one nor two.
     parameters.place.centre_m = [3e-3, 9e-3];
     let third = forward.predict(&parameters).unwrap();
     let three: Vec<f64> = (both.iter().zip(&third).zip(&plain))
@@ -326,7 +329,7 @@ fn a_ball_under_the_rim_has_a_place_and_no_size() {
     let [x, y] = inclusion.position_m.unwrap();
     let away = (x.value - 6e-3).hypot(y.value + 8e-3);
     assert!(away < 0.2e-3, "{away}");
-    // Its place is less well known than the pressures tell.
+    // The position is less well known than the pressures suggest.
     let [low, high] = x.interval;
     assert!(high - low > 2.0 * 1.96 * 0.03 * 16e-3, "{x:?}");
     assert!(inclusion.diameter_m.value().is_none(), "{found:?}");
@@ -362,13 +365,13 @@ fn balls_above_the_detection_limit_are_found_and_those_below_are_not() {
     };
     let found = limits(&plain, contrast).unwrap();
     let limit = found[0][0];
-    // Deeper a ball has to be larger. Beyond the used part none is searched.
+    // At larger depth a ball must be larger. Outside the used part no ball is searched.
     assert!(
         found[1][0] > limit && found[0][1].is_finite() && found[0][2].is_infinite(),
         "{found:?}"
     );
-    // The next press is beside this one, where it searches as much as any other and is nearest, and
-    // not on it.
+    // The next press is next to this one, where it searches as much as any other position and is
+    // nearest, and not at the same position.
     let next = |candidates: &[[f64; 2]]| {
         let nowhere = vec![vec![f64::INFINITY; places.len()]];
         search().next_position(&plain, &places, &nowhere, candidates)
@@ -378,10 +381,10 @@ fn balls_above_the_detection_limit_are_found_and_those_below_are_not() {
     assert_eq!(next(&[[90e-3, 0.0]]), None);
     let seen = search().next_position(&plain, &places, &found, &[[0.0; 2], [13e-3, 0.0]]);
     assert_eq!(seen, Some([13e-3, 0.0]));
-    // Stiffer ones show more.
+    // Stiffer balls are easier to detect.
     assert!(limits(&plain, 2.0 * contrast).unwrap()[0][0] < limit);
-    // The fall of χ² grows as the sixth power of the diameter: at 1.1 times the limit it is 266,
-    // far above what searches find, and at 0.65 times 11, far below.
+    // The fall of χ² grows with the sixth power of the diameter: at 1.1 times the limit it is 266,
+    // far above the threshold of searches, and at 0.65 times it is 11, far below.
     for (part, verdict) in [(1.1, SearchVerdict::Found), (0.65, SearchVerdict::Absent)] {
         let ball = lump(part * limit, depth_m, contrast * 5e3);
         for _ in 0..2 {
