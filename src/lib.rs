@@ -1,14 +1,14 @@
 //! Force, shape, strain and Young's modulus, each with its error, from the frames of an optical
 //! tactile sensor.
 //!
-//! A [`Pipeline`] holds the stages from a frame to the modulus, a [`Press`] the frames at one load
-//! or more. Only what is asked for is computed:
+//! A [`Pipeline`] holds the stages from a frame to the modulus, and a [`Press`] holds the frames at
+//! one or more loads. Each result is computed when it is requested:
 //!
 //! ```
 //! use tactile_imaging::force::CalibrationPair;
 //! use tactile_imaging::{Object, Pipeline};
 //!
-//! // Integrated pixel value (grey minus reference, summed) and force, as a gauge read it.
+//! // Integrated pixel value (grey minus reference, summed) and force, as read from a gauge.
 //! let pairs = [0.0, 0.1, 0.2, 0.3, 0.4].map(|n| CalibrationPair::loading(2e5 * n, n));
 //! let pipeline = Pipeline::from_pairs(&pairs, [86.2e-6; 2], Object::sphere(3e-3))?;
 //!
@@ -33,33 +33,33 @@
 //!
 //! # Where to look
 //!
-//! - A sensor's frames to every result: [`pipeline`]. Images, tables, streams, scene files and
-//!   calibrated sensors are read and written by the crate `tactile-files`.
-//! - Two point sets to displacement and strain with an error: [`strain_between()`].
+//! - From a sensor's frames to all results: [`pipeline`]. The crate `tactile-files` reads and
+//!   writes images, tables, streams, scene files and calibrated sensors.
+//! - From two point sets to displacement and strain with an error: [`strain_between()`].
 //! - Gels lit in colours, gels that darken, printed markers: [`gel`]. A lump under a surface:
 //!   [`inclusion`] (feature `inclusion`).
-//! - The stages alone: the crates below. A stage of one's own implements one trait of the
-//!   [`prelude`].
+//! - Single stages: the crates below. A user-defined stage implements one trait of the [`prelude`].
 //!
-//! "The paper", whose equation numbers stand in brackets, is *The Novel Artificial Intelligence
-//! Based Sub-Surface Inclusion Detection Device and Algorithm*.
+//! Equation numbers in brackets refer to "the paper", *The Novel Artificial Intelligence Based
+//! Sub-Surface Inclusion Detection Device and Algorithm*.
 //!
 //! # Equations
-//! What the stages compute. Each crate's page has its own.
+//! The stages compute the following. The page of each crate has its own equations.
 //!
-//! - Light stays inside below $\theta_i = \arcsin\sqrt{n_i^2 - 1}$ (1)–(4) until a press lets it
-//!   out: [`optics`].
+//! - Light stays inside below $\theta_i = \arcsin\sqrt{n_i^2 - 1}$ (1)–(4) until pressure lets it
+//!   leak: [`optics`].
 //! - Force $F_z = \int P dS$, centroid $\sum x I/\sum I$, shear $F_x = K_x u_x$ (5)–(12):
 //!   [`force`].
 //! - Surface from shading, $|\nabla z| = \sqrt{1/R^2 - 1}$ under frontal light: [`sfs`].
-//! - Matches: annealed softassign with a Gaussian-process prior by default, the paper's relaxation
-//!   labelling (13)–(20) by name, [`matching`]; warp $f(x) = a_0 + A x + \sum_i w_i U(|x - x_i|)$
-//!   (21)–(24): [`tps`].
-//! - Strain $E = \frac{1}{2}(F^T F - I)$ (25)–(30) and modulus $E = S_{zz}/\bar e_{zz}$ (31), or
-//!   Hertz's $a^3 = 3FR/(4E^{\ast})$: [`elasticity`].
+//! - Matches: annealed softassign with a Gaussian-process prior by default, or the paper's
+//!   relaxation labelling (13)–(20), [`matching`]; warp
+//!   $f(x) = a_0 + A x + \sum_i w_i U(|x - x_i|)$ (21)–(24): [`tps`].
+//! - Strain $E = \frac{1}{2}(F^T F - I)$ (25)–(30) and modulus $E = S_{zz}/\bar e_{zz}$ (31), or by
+//!   Hertz's law $a^3 = 3FR/(4E^{\ast})$: [`elasticity`].
 #![forbid(unsafe_code)]
 
-// The examples of README and guide run with the documentation's. Their links are of the repository.
+// The examples of README and guide run as documentation tests. Links are relative to the
+// repository.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 #[doc = include_str!("../docs/own_stage.md")]
@@ -90,8 +90,8 @@ pub use strain_between::{
 };
 pub use strain_series::{SeriesStrain, StrainSeries};
 
-/// The types and traits of a program that measures with stages of its own: `use
-/// tactile_imaging::prelude::*`.
+/// The types and traits that a program with user-defined stages needs:
+/// `use tactile_imaging::prelude::*`.
 pub mod prelude {
     pub use crate::elasticity::ElasticityError;
     pub use crate::elasticity::modulus::{LoadSeries, ModulusEstimate, ModulusEstimator};

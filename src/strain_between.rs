@@ -1,4 +1,4 @@
-//! Two point sets in, strain with its error out: match, field, strain.
+//! From two point sets to a strain with its error: match, field, strain.
 use crate::elasticity::ElasticityError;
 use crate::elasticity::field::{StrainField, StrainSummary};
 use crate::elasticity::strain::{Deformation, GreenLagrange, StrainMeasure};
@@ -7,7 +7,7 @@ use crate::tps::{LocalField, LocalValue, TpsError, nearest_rows};
 use nalgebra::{Matrix3, Point, SMatrix, SVector};
 use std::sync::Arc;
 
-/// The matcher and the measure of strain that [`strain_between`] takes.
+/// The matcher and the strain measure of [`strain_between`].
 ///
 /// ```
 /// use tactile_imaging::{
@@ -29,7 +29,7 @@ impl<const D: usize> Default for StrainBetweenOptions<D>
 where
     AnnealedSoftassign: PointMatcher<D>,
 {
-    /// Annealed softassign, Green–Lagrange.
+    /// Annealed softassign and Green–Lagrange strain.
     fn default() -> Self {
         Self {
             matcher: Arc::new(AnnealedSoftassign::default()),
@@ -40,30 +40,29 @@ where
 }
 
 impl<const D: usize> StrainBetweenOptions<D> {
-    /// With another matcher.
+    /// Sets the matcher.
     #[must_use]
     pub fn with_matcher(mut self, matcher: impl PointMatcher<D> + 'static) -> Self {
         self.matcher = Arc::new(matcher);
         self
     }
 
-    /// With another measure of strain.
+    /// Sets the strain measure.
     #[must_use]
     pub fn with_measure(mut self, measure: impl StrainMeasure + 'static) -> Self {
         self.measure = Arc::new(measure);
         self
     }
 
-    /// Answers with a strain of doubtful pairs too, its [`doubt`](StrainBetween::doubt) beside it.
-    /// By default
-    /// [`StrainBetweenError::Doubtful`] takes its place.
+    /// Returns the strain of doubtful pairs too, with its [`doubt`](StrainBetween::doubt). By
+    /// default the result is [`StrainBetweenError::Doubtful`] instead.
     #[must_use]
     pub fn with_doubtful_pairs(mut self) -> Self {
         self.doubtful_pairs = true;
         self
     }
 
-    /// Strain from the pairs of tracks, however few of the points they are.
+    /// Strain from the pairs of tracks, even if they are few of the points.
     pub(crate) fn total(
         &self,
         before: &[Point<f64, D>],
@@ -74,7 +73,7 @@ impl<const D: usize> StrainBetweenOptions<D> {
         self.allow(found)
     }
 
-    /// The strain, unless its pairs are doubtful and that was not asked for.
+    /// The strain, or an error if its pairs are doubtful and such pairs are not allowed.
     fn allow(&self, found: StrainBetween<D>) -> Result<StrainBetween<D>, StrainBetweenError> {
         match found.doubt {
             Some(doubt) if !self.doubtful_pairs => Err(StrainBetweenError::Doubtful(doubt)),
@@ -96,21 +95,21 @@ impl<const D: usize> StrainBetweenOptions<D> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum PairsDoubt {
-    /// The matcher's own doubt.
+    /// The doubt of the matcher.
     Matcher(Doubt),
-    /// Less than half of the smaller set lies on one smooth deformation.
+    /// Less than half of the smaller set fits one smooth deformation.
     FewPartners {
-        /// Share of the smaller set that does.
+        /// Fraction of the smaller set that does.
         share: f64,
     },
-    /// The residuals are so large that a point cannot be told from its neighbour.
+    /// The residuals are so large that a point cannot be distinguished from its neighbour.
     LargeResiduals {
-        /// Noise of one coordinate over the usual distance between neighbours.
+        /// Noise of one coordinate over the typical distance between neighbours.
         ratio: f64,
     },
-    /// The points lie in a plane of space, and nothing shows how what is across it deforms.
+    /// The points lie in a plane in space, so the deformation normal to it is unknown.
     Flat,
-    /// One set is a mirror image of the other, which no deformation makes.
+    /// One set is a mirror image of the other, which is not a deformation.
     Mirrored,
 }
 
@@ -129,14 +128,14 @@ impl std::fmt::Display for PairsDoubt {
                 100.0 * ratio
             ),
             Self::Flat => {
-                f.write_str("the points lie in a plane, and strain across it does not show")
+                f.write_str("the points lie in a plane, and the strain normal to it is unknown")
             }
             Self::Mirrored => f.write_str("one set is a mirror image of the other"),
         }
     }
 }
 
-/// Why there is no strain between two point sets.
+/// Why the strain between two point sets could not be computed.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -158,15 +157,15 @@ pub enum StrainBetweenError {
     /// Too few points have a partner.
     #[error("{found} matched points are too few for a strain and its error, which need {expected}")]
     TooFewPairs {
-        /// The least number.
+        /// Minimum number of pairs.
         expected: usize,
         /// Number of pairs.
         found: usize,
     },
-    /// The pairs may be wrong, and a strain of doubtful pairs was not asked for.
+    /// The pairs may be wrong, and strain of doubtful pairs is not allowed.
     #[error("no strain of doubtful pairs: {0}")]
     Doubtful(PairsDoubt),
-    /// No smooth deformation takes the points to their partners.
+    /// No smooth deformation maps the points to their partners.
     #[error("the matched points do not lie on any smooth deformation")]
     NotSmooth,
     /// The points could not be matched.
@@ -175,12 +174,12 @@ pub enum StrainBetweenError {
     /// The field could not be fitted.
     #[error(transparent)]
     Field(#[from] TpsError),
-    /// The strain does not exist.
+    /// The strain could not be computed.
     #[error(transparent)]
     Strain(#[from] ElasticityError),
 }
 
-/// Matches, displacement and strain between two point sets, each pair a row of the vectors.
+/// Matches, displacement and strain between two point sets. Each vector has one entry per pair.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct StrainBetween<const D: usize> {
@@ -188,49 +187,51 @@ pub struct StrainBetween<const D: usize> {
     pub rows: Vec<(usize, usize)>,
     /// Matched positions, before and after.
     pub pairs: Vec<[Point<f64, D>; 2]>,
-    /// Displacement of every matched point of the first set by the field.
+    /// Displacement of each matched point of the first set, by the field.
     pub displacements: Vec<SVector<f64, D>>,
-    /// Weight of every pair in the field, 0 if it was left out.
+    /// Weight of each pair in the field, 0 if it was excluded.
     pub weights: Vec<f64>,
-    /// Strain at every matched point of the first set.
+    /// Strain at each matched point of the first set.
     pub strains: Vec<Matrix3<f64>>,
-    /// Standard error of the strain at every matched point, as that of the mean.
+    /// Standard error of the strain at each matched point, with the same conventions as for the
+    /// mean.
     pub standard_errors: Vec<Matrix3<f64>>,
     /// Mean and spread of the strains.
     pub summary: StrainSummary,
-    /// Standard error of the mean. Points of one patch are taken to share their errors.
+    /// Standard error of the mean. Points of one patch are assumed to share their errors.
     pub standard_error: Matrix3<f64>,
     /// Degrees of freedom of the standard error.
     pub degrees_of_freedom: usize,
-    /// Noise of one coordinate, in the points' unit.
+    /// Noise of one coordinate, in the unit of the points.
     pub sigma: f64,
-    /// Points about which the noise is far above that elsewhere: short waves or jumps that the pairs
-    /// do not resolve. Their errors hold it.
+    /// Number of points whose surrounding noise is far above that elsewhere: short waves or jumps
+    /// that the pairs do not resolve. Their standard errors include it.
     pub unresolved: usize,
-    /// Why the pairs may be wrong, where there is a reason.
+    /// Why the pairs may be wrong. `None` if no check raised a doubt.
     pub doubt: Option<PairsDoubt>,
     pub(crate) field: LocalField<D>,
-    /// The field at every matched point.
+    /// The field at each matched point.
     pub(crate) values: Vec<LocalValue<D>>,
 }
 
-/// Displacement and strain at a point of the first set's space.
+/// Displacement and strain at a point in the space of the first set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct StrainAt<const D: usize> {
     /// Displacement.
     pub displacement: SVector<f64, D>,
-    /// Strain. Not a number where the deformation folds.
+    /// Strain. NaN if the deformation folds.
     pub strain: Matrix3<f64>,
     /// Standard error of the strain, which grows away from the matched points.
     pub standard_error: Matrix3<f64>,
 }
 
-/// Strain of the first set on its way to the second.
+/// Strain of the deformation from the first set to the second.
 ///
-/// The points are matched, a [`LocalField`] is fitted through the pairs, and its gradient is
-/// strained at every matched point. Wrong pairs have no weight, and pairs that the matcher missed
-/// are found where the field predicts them. Time and memory grow as the number of pairs.
+/// The points are matched, a [`LocalField`] is fitted through the pairs, and the strain follows
+/// from its gradient at each matched point. Wrong pairs have no weight, and pairs that the matcher
+/// missed are found where the field predicts them. Time and memory are proportional to the number
+/// of pairs.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -260,7 +261,7 @@ pub fn strain_between<const D: usize>(
 }
 
 impl<const D: usize> StrainBetween<D> {
-    /// Strain from a match of two sets: the second half of [`strain_between`].
+    /// Strain from a match of two sets: the second step of [`strain_between`].
     ///
     /// # Errors
     /// [`StrainBetweenError`].
@@ -284,10 +285,10 @@ impl<const D: usize> StrainBetween<D> {
         options.allow(found)
     }
 
-    /// Strain from pairs that are known, as of finite elements, image correlation or a tracker: row
-    /// i of `before` is row i of `after`. Nothing is matched.
+    /// Strain from known pairs, for example from finite elements, image correlation or a tracker:
+    /// row i of `before` corresponds to row i of `after`. Nothing is matched.
     ///
-    /// Rows with a coordinate that is not finite are skipped: [`rows`](Self::rows) has the others.
+    /// Rows with a non-finite coordinate are skipped: [`rows`](Self::rows) lists the others.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -308,7 +309,7 @@ impl<const D: usize> StrainBetween<D> {
     /// ```
     ///
     /// # Errors
-    /// [`StrainBetweenError`], among others for sets of different lengths.
+    /// [`StrainBetweenError`], including one for sets of different lengths.
     pub fn of_known_pairs(
         before: &[Point<f64, D>],
         after: &[Point<f64, D>],
@@ -336,13 +337,14 @@ impl<const D: usize> StrainBetween<D> {
         for (i, j) in &mut found.rows {
             (*i, *j) = (known[*i], known[*j]);
         }
-        // No point can be taken for its neighbour.
+        // The correspondence is known, so no point can be mistaken for its neighbour.
         let doubt = found.doubt;
         found.doubt = doubt.filter(|d| !matches!(d, PairsDoubt::LargeResiduals { .. }));
         options.allow(found)
     }
 
-    /// Strain from pairs, rows of both sets. A [`doubt`](Self::doubt) is no error here.
+    /// Strain from pairs, given as rows of both sets. A [`doubt`](Self::doubt) is not an error
+    /// here.
     ///
     /// # Errors
     /// [`StrainBetweenError`].
@@ -356,7 +358,7 @@ impl<const D: usize> StrainBetween<D> {
         Self::of_share(before, after, matched, measure, possible)
     }
 
-    /// The same where so many points can have a partner.
+    /// Like `of_pairs`, if this number of points can have a partner.
     fn of_share(
         before: &[Point<f64, D>],
         after: &[Point<f64, D>],
@@ -364,7 +366,7 @@ impl<const D: usize> StrainBetween<D> {
         measure: &dyn StrainMeasure,
         possible: usize,
     ) -> Result<Self, StrainBetweenError> {
-        // An affine field, and a pair more for its error.
+        // An affine field, and one more pair for its error.
         let expected = D + 2;
         let found = matched.len();
         if found < expected {
@@ -391,7 +393,8 @@ impl<const D: usize> StrainBetween<D> {
         let errors = |value: &LocalValue<D>| strain_error(value, measure);
         let standard_errors: Vec<_> = values.iter().map(errors).collect();
         let centre = mean_value(&values, field.mean_gradient_covariance);
-        // Noise and what the pairs do not resolve. A rough field through wrong pairs has no noise.
+        // Noise and detail that the pairs do not resolve. A rough field through wrong pairs has no
+        // noise.
         let usual = [0.674_5, 1.177_4, 1.538_2][D - 1];
         let miss = median(field.misses.iter().copied()).unwrap_or(0.0) / usual;
         let sigma = median(values.iter().map(|value| value.sigma)).unwrap_or(0.0);
@@ -415,19 +418,19 @@ impl<const D: usize> StrainBetween<D> {
         })
     }
 
-    /// Whether a pair counts in the deformation, and was not left out as misplaced.
+    /// Whether a pair contributes to the deformation and was not rejected as misplaced.
     #[must_use]
     pub fn is_kept(&self, pair: usize) -> bool {
         self.weights.get(pair).is_some_and(|&weight| weight >= 1e-3)
     }
 
-    /// Where the deformation takes points of the first set's space.
+    /// The images of points in the space of the first set under the deformation.
     pub(crate) fn images(&self, points: &[Point<f64, D>]) -> Vec<Point<f64, D>> {
         let moved = self.field.at(points).into_iter().zip(points);
         moved.map(|(value, p)| p + value.displacement).collect()
     }
 
-    /// Displacement and strain at any points of the first set's space.
+    /// Displacement and strain at any points in the space of the first set.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -467,13 +470,13 @@ impl<const D: usize> StrainBetween<D> {
     }
 }
 
-/// H at every place of local fits, in three dimensions.
+/// The displacement gradient H of each local fit, in three dimensions.
 fn gradients_of<const D: usize>(values: &[LocalValue<D>]) -> Vec<Matrix3<f64>> {
     let gradients = values.iter().map(|value| value.gradient.fixed_resize(0.0));
     gradients.collect()
 }
 
-/// The mean of some values, its gradient with this covariance.
+/// The mean of local values, with this covariance of its gradient.
 fn mean_value<const D: usize>(
     values: &[LocalValue<D>],
     covariance: SMatrix<f64, D, D>,
@@ -485,8 +488,8 @@ fn mean_value<const D: usize>(
     Some(mean)
 }
 
-/// Standard error of the strain, to first order in the gradient's. Infinite where it follows a
-/// derivative along an axis that the points do not span.
+/// Standard error of the strain, to first order in the error of the gradient. Infinite if the
+/// strain depends on a derivative along an axis that the points do not span.
 fn strain_error<const D: usize>(
     value: &LocalValue<D>,
     measure: &dyn StrainMeasure,
@@ -524,7 +527,7 @@ fn strain_error<const D: usize>(
             add(row, direction * size.max(0.0).sqrt(), 1.0);
         }
         for axis in (0..D).filter(|&a| !known(a)) {
-            // Any step shows what follows this derivative.
+            // A step of any size reveals the dependence on this derivative.
             let direction = SVector::from_fn(|a, _| if a == axis { 1e-3 } else { 0.0 });
             add(row, direction, f64::INFINITY);
         }
@@ -532,15 +535,15 @@ fn strain_error<const D: usize>(
     squares.map(f64::sqrt)
 }
 
-/// The pairs without those around which most points of both sets have no partner: where a matcher
-/// fails, as in a corner that it took for one seen already, single points meet by chance. A part
-/// of one set that is not in the other has partners on the other side.
+/// Keeps the pairs around which most points of both sets have a partner. If a matcher fails, for
+/// example in a corner that it confused with another, single points match by chance. A part that
+/// exists in one set only has partners on the other side.
 fn among_matched<const D: usize>(
     before: &[Point<f64, D>],
     after: &[Point<f64, D>],
     matched: &[(usize, usize)],
 ) -> Vec<(usize, usize)> {
-    // Half of the usual share in both sets: of random outliers 1 pair in 10⁴ has as few.
+    // Half of the typical fraction in both sets: with random outliers, one pair in 10⁴ has fewer.
     let neighbours = 16.min(before.len()).min(after.len());
     let matched_nearby = |set: &[Point<f64, D>], rows: &[usize]| -> Vec<bool> {
         let mut has_partner = vec![false; set.len()];
@@ -558,8 +561,7 @@ fn among_matched<const D: usize>(
     kept.map(|(pair, _)| *pair).collect()
 }
 
-/// Pairs of points without a partner whose prediction meets a point without one, and the field
-/// there.
+/// Pairs of unmatched points whose prediction meets an unmatched point, with the field there.
 fn missed_partners<const D: usize>(
     before: &[Point<f64, D>],
     after: &[Point<f64, D>],
@@ -573,14 +575,14 @@ fn missed_partners<const D: usize>(
     }
     let open: Vec<usize> = (0..before.len()).filter(|&i| open[i]).collect();
     let mut free: Vec<usize> = (0..after.len()).filter(|&j| free[j]).collect();
-    // Only points near along the first axis can be near.
+    // Only points close along the first axis can be close.
     free.sort_unstable_by(|&a, &b| after[a][0].total_cmp(&after[b][0]));
     let places: Vec<_> = open.iter().map(|&i| before[i]).collect();
     let values = field.at(&places);
     let mut meetings = Vec::new();
     for (k, value) in values.iter().enumerate() {
-        // Four standard errors of the prediction and the point. Where they reach farther than a
-        // third of the spacing, a meeting is as likely by chance.
+        // Four standard errors of the prediction and the point. Beyond a third of the spacing, a
+        // chance coincidence is equally likely.
         let error = (value.displacement_variance + value.sigma * value.sigma).sqrt();
         if 4.0 * error > reach {
             continue;
@@ -607,7 +609,7 @@ fn missed_partners<const D: usize>(
     (pairs, found)
 }
 
-/// The middle value, the upper of two.
+/// The median, the upper one of two.
 pub(crate) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.collect();
     let middle = values.len() / 2;
@@ -616,7 +618,7 @@ pub(crate) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     place.map(|(_, value, _)| *value)
 }
 
-/// Doubt about sets whose strain has no meaning.
+/// A doubt about sets whose strain is meaningless.
 fn shape_doubt<const D: usize>(
     sources: &[Point<f64, D>],
     field: &StrainField,
@@ -635,12 +637,12 @@ fn shape_doubt<const D: usize>(
     (2 * field.folded.len() > sources.len()).then_some(PairsDoubt::Mirrored)
 }
 
-/// Why a share of matched points or their residuals over the distance between neighbours cast doubt
-/// on the pairs.
+/// A doubt if too few points match, or if their residuals are too large compared with the distance
+/// between neighbours.
 ///
-/// Where the deformation is wrong, a prediction meets some point within a third of the spacing by
-/// chance, a tenth of them in space and a third in the plane. Residuals of a quarter of the spacing
-/// exchange one neighbour in twenty.
+/// If the deformation is wrong, a prediction meets some point within a third of the spacing by
+/// chance: a tenth of them in space and a third in the plane. Residuals of a quarter of the spacing
+/// swap one neighbour in twenty.
 fn doubt(share: f64, ratio: f64) -> Option<PairsDoubt> {
     if share < 0.5 {
         Some(PairsDoubt::FewPartners { share })

@@ -1,4 +1,4 @@
-//! Rotation, principal strains, change of size and equivalent strain of the strain between sets.
+//! Rotation, principal strains, volume change and equivalent strain between two point sets.
 
 use crate::elasticity::kinematics::StrainQuantities;
 use crate::elasticity::strain::StrainMeasure;
@@ -7,13 +7,13 @@ use crate::tps::LocalValue;
 use nalgebra::Point;
 
 impl<const D: usize> StrainBetween<D> {
-    /// What is read of the deformation at any points of the first set's space, each quantity with
-    /// its standard error. NaN throughout where the deformation folds.
+    /// Quantities derived from the deformation gradient at any points in the space of the first
+    /// set, each with its standard error. All are NaN if the deformation folds.
     ///
     /// ```
     /// use nalgebra::Point2;
     /// use tactile_imaging::{StrainBetween, StrainBetweenOptions, elasticity::strain::Biot};
-    /// // A sheet turns by 0.3 rad and grows by 10 % along its own x.
+    /// // A sheet rotates by 0.3 rad and grows by 10 % along its own x axis.
     /// let before: Vec<_> = (0..64)
     ///     .map(|k| Point2::new(f64::from(k % 8), f64::from(k / 8)))
     ///     .collect();
@@ -38,7 +38,7 @@ impl<const D: usize> StrainBetween<D> {
         read(&self.field.at(points), measure)
     }
 
-    /// The same at every matched point of the first set.
+    /// Like [`kinematics_at`](Self::kinematics_at), at each matched point of the first set.
     #[must_use]
     pub fn kinematics(&self, measure: &dyn StrainMeasure) -> Vec<StrainQuantities> {
         read(&self.values, measure)

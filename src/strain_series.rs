@@ -1,17 +1,17 @@
-//! Points followed through the frames of a deformation, and the strain of every step.
+//! Points followed through the frames of a deformation, with the strain of each step.
 use crate::strain_between::{StrainBetween, StrainBetweenError, StrainBetweenOptions};
 use nalgebra::Point;
 
 /// Follows points through frames: pairs from each frame to the next, chained to tracks, and the
-/// strain of every step and since the first frame.
+/// strain of each step and since the first frame.
 ///
-/// The matcher starts where each point would be if it went on as in the last step, and from where
-/// the points are if that fails. Points come and go: a new one begins a track, and a track of the
-/// first frame that was interrupted goes on where the deformation since then meets a new point.
-/// Strain since the first frame comes from the tracks that go back to it, so that it is found at
-/// deformations where no matcher finds pairs directly. The time of a frame is that of two
-/// [`strain_between`](crate::strain_between). The first frame and the last are held in memory, and
-/// the rows of all tracks.
+/// The matcher starts from the positions predicted by the last step, or from the current positions
+/// if this fails. Points may appear and disappear: a new point starts a track, and an interrupted
+/// track of the first frame continues if the total deformation maps it to a new point. Strain since
+/// the first frame comes from the tracks that reach back to it, so it is available for deformations
+/// that no matcher could handle directly. A frame costs as much time as two calls of
+/// [`strain_between`](crate::strain_between). The first frame, the last frame and the rows of all
+/// tracks are kept in memory.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -41,11 +41,11 @@ pub struct StrainSeries<const D: usize> {
     options: StrainBetweenOptions<D>,
     first: Vec<Point<f64, D>>,
     last: Vec<Point<f64, D>>,
-    /// Where the points of the last frame would be in the next.
+    /// Predicted positions of the last frame's points in the next frame.
     predicted: Vec<Point<f64, D>>,
     frames: usize,
     tracks: Vec<Vec<(usize, usize)>>,
-    /// The track of every row of the last frame.
+    /// The track of each row of the last frame.
     track_of: Vec<usize>,
 }
 
@@ -53,14 +53,14 @@ pub struct StrainSeries<const D: usize> {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct SeriesStrain<const D: usize> {
-    /// From the last frame.
+    /// Strain since the last frame.
     pub step: StrainBetween<D>,
-    /// From the first frame. An error where too few tracks go back to it.
+    /// Strain since the first frame. An error if too few tracks reach back to it.
     pub total: Result<StrainBetween<D>, StrainBetweenError>,
 }
 
 impl<const D: usize> StrainSeries<D> {
-    /// A series that begins with these points.
+    /// A series that starts with these points.
     #[must_use]
     pub fn new(first: &[Point<f64, D>], options: StrainBetweenOptions<D>) -> Self {
         Self {
@@ -74,18 +74,18 @@ impl<const D: usize> StrainSeries<D> {
         }
     }
 
-    /// The tracks in the order of their beginnings: frames and rows of a point, both from 0.
-    /// Frames that were refused are not counted.
+    /// The tracks in the order of their first frames: frame and row of each point, both from 0.
+    /// Rejected frames are not counted.
     #[must_use]
     pub fn tracks(&self) -> &[Vec<(usize, usize)>] {
         &self.tracks
     }
 
-    /// The next frame.
+    /// Adds the next frame.
     ///
     /// # Errors
-    /// As [`strain_between`](crate::strain_between) for the step from the last frame. The series is
-    /// then as it was, and the frame after may follow.
+    /// Those of [`strain_between`](crate::strain_between) for the step from the last frame. The
+    /// series is then unchanged, and another frame may follow.
     pub fn push(&mut self, next: &[Point<f64, D>]) -> Result<SeriesStrain<D>, StrainBetweenError> {
         let step = match self.step_from(&self.predicted, next) {
             Err(_) if self.predicted != self.last => self.step_from(&self.last, next)?,
@@ -138,7 +138,7 @@ impl<const D: usize> StrainSeries<D> {
         Ok(SeriesStrain { step, total })
     }
 
-    /// The step from the last frame, its points matched from where `start` has them.
+    /// The step from the last frame. Matching starts from the positions `start`.
     fn step_from(
         &self,
         start: &[Point<f64, D>],

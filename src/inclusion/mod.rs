@@ -1,6 +1,6 @@
-//! An inclusion in a block of tissue, from frames: ring means of pressure images, and their cells.
+//! An inclusion in a block of tissue, from frames: ring means and cell means of pressure images.
 //!
-//! The search itself is [`InclusionSearch`], of the crate `tactile-inclusion`.
+//! The search itself is [`InclusionSearch`], from the crate `tactile-inclusion`.
 mod rings;
 #[cfg(test)]
 mod tests;

@@ -1,18 +1,19 @@
-//! Mean pressure over the radius, from an image.
+//! Radial profile of the mean pressure, from an image.
 
 use ndarray::{Array2, ArrayView2};
 use tactile_inclusion::PressureProfile;
 
-/// Rings over a face, as narrow as a pixel of common scenes, in which the profile hardly bends.
+/// Number of rings over a face: as narrow as a pixel of common scenes, so that the profile is
+/// nearly straight within each.
 const RINGS: usize = 60;
 
-/// Mean pressure in rings around the face's centre.
+/// Mean pressure in rings around the centre of the face.
 ///
 /// ```
 /// use tactile_imaging::inclusion::ring_means;
 /// use ndarray::Array2;
 ///
-/// // A disc of 30 pixels radius under even light, at 0.5 mm a pixel; a grey level is 30 Pa.
+/// // A disc of 30 pixels radius under even light, at 0.5 mm per pixel; a grey level is 30 Pa.
 /// let image = Array2::from_shape_fn((81, 91), |(y, x)| {
 ///     let r = (x as f64 - 45.0).hypot(y as f64 - 40.0);
 ///     if r < 30.0 { 100.0 } else { 0.0 }
@@ -26,23 +27,24 @@ const RINGS: usize = 60;
 pub struct RingMeans {
     /// Centre of the pressed region (x, y), in pixels.
     pub centre_px: [f64; 2],
-    /// Radii of the rings' middles, in metres.
+    /// Mean radii of the rings, in metres.
     pub radii_m: Vec<f64>,
     /// Mean pressure of each ring, in pascals.
     pub pressure_pa: Vec<f64>,
     /// Standard error of each mean from the noise of single pixels, in pascals.
     pub standard_error_pa: Vec<f64>,
-    /// Standard deviation of a pixel's noise, in pascals.
+    /// Standard deviation of the pixel noise, in pascals.
     pub pixel_noise_pa: f64,
-    /// First harmonic of the pressure around the inner three quarters of the face, over its mean.
-    /// It is zero for pressures that are symmetric about the axis.
+    /// First harmonic of the pressure within three quarters of the face radius, relative to its
+    /// mean. It is zero if the pressure is symmetric about the axis.
     pub asymmetry: f64,
-    /// Second to fourth harmonics of the rings there, over the pressure: the root of their mean
-    /// square, noise taken out. It is zero for pressures that are symmetric about the axis.
+    /// Root mean square of the second to fourth harmonics of the rings in the same region, relative
+    /// to the pressure and corrected for noise. It is zero if the pressure is symmetric about the
+    /// axis.
     pub harmonics: f64,
 }
 
-/// Why an image has no ring means.
+/// Why ring means cannot be computed from an image.
 ///
 /// ```
 /// use tactile_imaging::inclusion::{RingError, ring_means};
@@ -55,7 +57,7 @@ pub enum RingError {
     /// Nothing presses on the face.
     #[error("no part of the frame is brighter than the reference: nothing presses on the face")]
     NoContact,
-    /// The face is not within the frame.
+    /// The face is not entirely within the frame.
     #[error(
         "the face, {radius_px:.0} pixels in radius around ({x:.0}, {y:.0}), is cut by the frame's \
          border"
@@ -65,16 +67,16 @@ pub enum RingError {
         x: f64,
         /// Centre, y.
         y: f64,
-        /// The face's radius in pixels.
+        /// Face radius in pixels.
         radius_px: f64,
     },
 }
 
 /// Mean pressure in rings around the centre of the pressed region.
 ///
-/// Light is taken as proportional to the pressure, p = s I with the frame's brightening I and
-/// `pascals_per_grey` s. `image` is the brightening, [row, column], `pixel_size_m` is (x, y), and
-/// `face_radius_m` the guide's. O(pixels).
+/// Light is assumed proportional to the pressure: p = s I, where I is the brightening of the frame
+/// and s is `pascals_per_grey`. `image` is the brightening, [row, column], `pixel_size_m` is (x,
+/// y), and `face_radius_m` is the radius of the guide's face. O(pixels).
 ///
 /// ```
 /// use tactile_imaging::inclusion::ring_means;
@@ -101,14 +103,14 @@ pub fn ring_means(
         return Err(RingError::NoContact);
     }
     let [sx, sy] = pixel_size_m;
-    // The pressed region has a quarter of the frame's high values.
+    // The threshold of the pressed region is a quarter of the high values of the frame.
     let centre_px = centre(image, 0.25 * high).ok_or(RingError::NoContact)?;
     let (rows, columns) = image.dim();
     let inside = |centre: f64, size: f64, count: usize| {
         let reach = 0.8 * face_radius_m / size;
         centre - reach >= 0.0 && centre + reach <= count as f64 - 1.0
     };
-    // The rim itself may be cut: the rings of the outer fifth are not used.
+    // The rim itself may be cut, because the rings of the outer fifth are not used.
     if !(inside(centre_px[0], sx, columns) && inside(centre_px[1], sy, rows)) {
         return Err(RingError::Cut {
             x: centre_px[0],
@@ -117,7 +119,7 @@ pub fn ring_means(
         });
     }
     let width = face_radius_m / RINGS as f64;
-    // Beyond, the pressure rises steeply to the rim, and a search does not use it.
+    // Outside this radius the pressure rises steeply to the rim, and a search does not use it.
     let used_radius_m = 0.75 * face_radius_m;
     let mut rings = vec![Ring::default(); RINGS];
     let mut harmonic = [0.0; 2];
@@ -168,11 +170,11 @@ pub fn ring_means(
     })
 }
 
-/// Root mean square of the second to fourth harmonics around rings over the mean value. Of each
-/// pixel are given its radius over the outermost, its angle, its value and how far that is from its
-/// ring's mean.
+/// Root mean square of the second to fourth harmonics around rings, relative to the mean value.
+/// Each pixel is given as (radius over the outermost radius, angle, value, deviation from the mean
+/// of its ring).
 fn harmonics(pixels: impl Iterator<Item = (f64, f64, f64, f64)>, noise: f64) -> f64 {
-    // Rings wide enough that pixels lie evenly around all but the innermost.
+    // The rings are wide enough for an even distribution of pixels around all but the innermost.
     const RINGS: usize = 12;
     const ORDERS: [f64; 3] = [2.0, 3.0, 4.0];
     let mut sums = [[[0.0; 2]; ORDERS.len()]; RINGS];
@@ -188,7 +190,7 @@ fn harmonics(pixels: impl Iterator<Item = (f64, f64, f64, f64)>, noise: f64) -> 
         }
     }
     let count: f64 = counts.iter().sum();
-    // White noise of variance σ² adds 4 σ² / n to an amplitude's square.
+    // White noise of variance σ² adds 4 σ² / n to the square of an amplitude.
     let squares = (sums.iter().zip(counts)).filter(|(_, n)| *n > 0.0);
     let squares = squares.flat_map(|(ring, n)| {
         let square = move |[a, b]: &[f64; 2]| 4.0 * ((a * a + b * b) / n - noise * noise);
@@ -198,7 +200,7 @@ fn harmonics(pixels: impl Iterator<Item = (f64, f64, f64, f64)>, noise: f64) -> 
 }
 
 impl RingMeans {
-    /// As a profile at other radii, linear between the rings' and the outermost beyond them: the
+    /// The profile at other radii: linear between the rings, constant beyond the outermost. The
     /// search compares frames ring by ring.
     #[must_use]
     pub fn profile(
@@ -220,7 +222,7 @@ impl RingMeans {
     }
 }
 
-/// A value between those at ascending radii, the outermost beyond them.
+/// Linear interpolation of values at ascending radii, constant beyond the outermost.
 fn interpolated(radii: &[f64], values: &[f64], radius: f64) -> f64 {
     if radii.len() < 2 {
         return values.first().copied().unwrap_or(0.0);
@@ -238,11 +240,11 @@ struct Ring {
     radius: f64,
 }
 
-/// Square cells of a face and their pixels.
+/// Square cells of a face, each with its pixels.
 ///
 /// ```
 /// use tactile_imaging::inclusion::FaceCells;
-/// // A face of 10 mm radius around the middle of the image, 0.5 mm a pixel, in cells of 2.5 mm.
+/// // A face of 10 mm radius around the image's centre, 0.5 mm per pixel, in cells of 2.5 mm.
 /// let cells = FaceCells::new((41, 41), [20.0; 2], [0.5e-3; 2], 10e-3, 2.5e-3);
 /// let tilted = ndarray::Array2::from_shape_fn((41, 41), |(_, x)| x as f64);
 /// let first = (cells.means(&tilted.view())[0], cells.positions_m[0][0]);
@@ -250,17 +252,17 @@ struct Ring {
 /// ```
 #[derive(Clone, Debug)]
 pub struct FaceCells {
-    /// Middle (x, y) of each from the axis.
+    /// Centre (x, y) of each cell relative to the axis.
     pub positions_m: Vec<[f64; 2]>,
-    /// Number of pixels in each.
+    /// Number of pixels in each cell.
     counts: Vec<f64>,
     /// Cell of each pixel [row, column].
     cells: Array2<Option<usize>>,
 }
 
 impl FaceCells {
-    /// Those within three quarters of a face's radius around a centre in pixels, of some width in
-    /// metres.
+    /// Creates the cells within three quarters of the face radius. The centre is in pixels, the
+    /// cell width in metres.
     pub fn new(
         size: (usize, usize),
         centre_px: [f64; 2],
@@ -305,26 +307,26 @@ impl FaceCells {
         pairs.map(|(sum, count)| sum / count).collect()
     }
 
-    /// Error of each mean by a pixel's noise.
+    /// Standard error of each mean, from the noise of a pixel.
     pub fn errors(&self, pixel_noise: f64) -> Vec<f64> {
         let error = |count: &f64| pixel_noise / count.sqrt();
         self.counts.iter().map(error).collect()
     }
 }
 
-/// The value that one pixel in a hundred exceeds.
+/// The value exceeded by one pixel in a hundred.
 fn high_value(image: &ArrayView2<'_, f64>) -> f64 {
     let mut values: Vec<f64> = image.iter().copied().filter(|v| v.is_finite()).collect();
     if values.is_empty() {
         return 0.0;
     }
-    // A quantile instead of the maximum: single bright pixels do not count.
+    // A quantile instead of the maximum, so that single bright pixels have no effect.
     let at = values.len() - 1 - values.len() / 100;
     *values.select_nth_unstable_by(at, f64::total_cmp).1
 }
 
-/// Centre (x, y) of the pixels above a threshold whose four neighbours are, too: single bright
-/// pixels do not count.
+/// Centre (x, y) of the pixels above a threshold whose four neighbours are above it too, so that
+/// single bright pixels have no effect.
 fn centre(image: &ArrayView2<'_, f64>, threshold: f64) -> Option<[f64; 2]> {
     let above: Array2<bool> = image.mapv(|value| value > threshold);
     let (rows, columns) = image.dim();
@@ -342,9 +344,9 @@ fn centre(image: &ArrayView2<'_, f64>, threshold: f64) -> Option<[f64; 2]> {
     (sums[0] > 0.0).then(|| [sums[1] / sums[0], sums[2] / sums[0]])
 }
 
-/// Standard deviation of a pixel's noise, from second differences along rows (variance 6σ²) between
-/// pixels that are inside. A smooth profile cancels, but the steep rim of the face would not. Not
-/// below that of rounding to grey levels.
+/// Standard deviation of the pixel noise, from second differences along rows (variance 6σ²) between
+/// inside pixels. A smooth profile cancels in them; the steep rim of the face would not. The result
+/// is at least the rounding error of grey levels.
 fn pixel_noise(image: &ArrayView2<'_, f64>, is_inside: impl Fn(usize, usize) -> bool) -> f64 {
     let (mut squares, mut count) = (0.0, 0.0);
     for (y, row) in image.rows().into_iter().enumerate() {
@@ -355,7 +357,7 @@ fn pixel_noise(image: &ArrayView2<'_, f64>, is_inside: impl Fn(usize, usize) -> 
             }
         }
     }
-    // Standard deviation of a number that is rounded to the next whole one.
+    // Standard deviation of the error of rounding to integers.
     let rounding = 1.0 / 12f64.sqrt();
     if count > 0.0 {
         (squares / (6.0 * count)).sqrt().max(rounding)

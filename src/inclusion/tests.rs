@@ -1,4 +1,4 @@
-//! Ring means of discs whose profile and noise are known.
+//! Ring means of discs with known profile and noise.
 use super::rings::{RingError, ring_means};
 use ndarray::Array2;
 use rand::{RngExt, SeedableRng};
@@ -16,12 +16,13 @@ fn a_profile_is_read_from_its_image() {
     let light = |r: f64| 100.0 + 40.0 * (-(r / 5e-3).powi(2)).exp();
     let image = disc([76.3, 70.8], light);
     let rings = ring_means(&image.view(), [0.25e-3; 2], 7.0, 15e-3).unwrap();
-    // Pixels at the rim count whole or not at all: a hundredth of a pixel over 11,000.
+    // Pixels at the rim are inside or outside as a whole, which changes the centre by a hundredth
+    // of a pixel over 11,000 pixels.
     assert!((rings.centre_px[0] - 76.3).abs() < 0.1 && (rings.centre_px[1] - 70.8).abs() < 0.1);
     for (r, p) in rings.radii_m.iter().zip(&rings.pressure_pa) {
         if *r < 0.9 * 15e-3 {
             let expected = 7.0 * light(*r);
-            // A ring is as wide as a pixel: curvature within it is below a thousandth.
+            // A ring is as wide as a pixel, and the curvature within it is below a thousandth.
             assert!((p / expected - 1.0).abs() < 3e-3, "{r} {p} {expected}");
         }
     }
@@ -43,7 +44,7 @@ fn the_stated_error_is_the_scatter_of_the_means() {
             count += 1.0;
         }
     }
-    // 740 values of variance one: 1 ± 0.05.
+    // 740 values of variance one: the mean square is 1 ± 0.05.
     let ratio = squares / count;
     assert!((ratio - 1.0).abs() < 0.2, "{ratio}");
 }
@@ -59,14 +60,16 @@ fn a_steep_rim_is_no_noise() {
     let rings = ring_means(&noisy.view(), [0.25e-3; 2], 1.0, 15e-3).unwrap();
     let area = |radius: f64| core::f64::consts::TAU * radius * 0.25e-3 / 0.25e-3f64.powi(2);
     let noise = rings.standard_error_pa[30] * area(rings.radii_m[30]).sqrt();
-    // 5,000 differences: 1 %. The number of a ring's pixels is within 5 % of its area.
+    // 5,000 differences determine the noise to 1 %. The number of pixels of a ring is within 5 % of
+    // its area.
     assert!((noise / 1.9 - 1.0).abs() < 0.06, "{noise}");
 }
 
 #[test]
 fn harmonics_are_those_of_the_pressure_and_not_of_its_noise() {
-    // Of amplitude 2 % around every ring, on a profile that falls by a third: 2 % but for pixels
-    // that a ring's edge cuts. Noise of 1 % a pixel adds nothing beyond its own scatter, 0.05 %.
+    // An amplitude of 2 % around each ring, on a profile that falls by a third, gives 2 % apart
+    // from pixels cut by the edge of a ring. Noise of 1 % per pixel adds only its own scatter, 0.05
+    // %.
     for (amplitude, tolerance) in [(0.02, 1e-3), (0.0, 2e-3)] {
         let mut image = disc([74.0, 70.0], |r| 100.0 - 2e3 * r);
         let mut rng = rand::rngs::ChaCha8Rng::seed_from_u64(3);

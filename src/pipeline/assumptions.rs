@@ -1,9 +1,9 @@
-//! What is assumed where nothing is stated, and what presses of known force show of the sensor.
+//! Default errors of inputs, and what presses of known force reveal about the sensor.
 use super::text::with_error;
 use crate::core::{Estimate, InvalidOption, Requirement, Source};
 use std::fmt::{self, Display, Formatter};
 
-/// An input whose error is assumed where none is stated.
+/// An input whose error has a default.
 ///
 /// ```
 /// use tactile_imaging::force::Source;
@@ -15,33 +15,34 @@ use std::fmt::{self, Display, Formatter};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Assumption {
-    /// The source that its error is.
+    /// Error source of the input.
     pub source: Source,
-    /// The key of a scene file that states it, and but for units the keyword in Python.
+    /// The key of the input's error in a scene file. It is also the keyword in Python, apart from
+    /// units.
     pub key: &'static str,
-    /// The standard error that is assumed.
+    /// The default standard error.
     pub default: f64,
     /// The unit of the default, and of [`Assumptions::state`].
     pub unit: &'static str,
-    /// What makes it smaller.
+    /// What reduces the error.
     pub remedy: &'static str,
 }
 
 impl Assumption {
-    /// Every input with a default. This is the place to change one.
+    /// Every input with a default. To change a default, change it here.
     ///
-    /// [`Source::Gain`]: the gauge's scale, and light that is uneven over the frame, by which
-    /// contacts of another size than the calibration's are read with another gain.
-    /// [`Source::Coupling`]: a bare guide scatters by what touches it, and the object may reflect
-    /// otherwise than what it was calibrated with. Zero under a fixed diffusing skin, or for the
-    /// calibrator itself. [`Source::ObjectSize`] is of the radius of a ball, a punch or an
-    /// indenter. [`Source::Guide`] stands back behind a covariance of the layers
+    /// [`Source::Gain`]: the scale of the gauge, and uneven light over the frame, because of which
+    /// contacts of another size than the calibration's have another gain. [`Source::Coupling`]: a
+    /// bare guide scatters light according to the touching material, and the object may reflect
+    /// differently from the calibrator. It is zero under a fixed diffusing skin, and for the
+    /// calibrator itself. [`Source::ObjectSize`] is the error of the radius of a ball, a punch or
+    /// an indenter. [`Source::Guide`] is not used if there is a covariance of the layers
     /// ([`Settings::layer_covariance`](field@crate::pipeline::Settings::layer_covariance)).
     pub const ALL: [Self; 7] = [
         Self {
             source: Source::Gain,
             key: "gauge_error",
-            // A gauge to 0.2 %, and light that is uneven by 0.1 %: √(0.2² + 0.1²) %.
+            // A gauge accurate to 0.2 % and light uneven by 0.1 %: √(0.2² + 0.1²) %.
             default: 2.236_067_977_499_79e-3,
             unit: "of the force",
             remedy: "a better gauge, or a flat field",
@@ -49,7 +50,7 @@ impl Assumption {
         Self {
             source: Source::Coupling,
             key: "coupling_error",
-            // An object that reflects a fifth less than the calibrator is held.
+            // The allowance includes an object that reflects a fifth less than the calibrator.
             default: 0.12,
             unit: "of the force",
             remedy: "a press of this object under a known weight ([[check]])",
@@ -78,7 +79,7 @@ impl Assumption {
         Self {
             source: Source::Adhesion,
             key: "adhesion_error_j_per_m2",
-            // A dusted ball. Clean dry silicone has some tens of mJ/m².
+            // The value for a dusted ball. Clean dry silicone has several tens of mJ/m².
             default: 1e-3,
             unit: "J/m²",
             remedy: "larger forces, or talc and a statement of adhesion_error_j_per_m2",
@@ -92,7 +93,7 @@ impl Assumption {
         },
     ];
 
-    /// That of a source. `None` if its error is measured.
+    /// The assumption for a source. `None` if the error of the source is measured.
     #[must_use]
     pub fn of(source: Source) -> Option<&'static Self> {
         const ALL: &[Assumption] = &Assumption::ALL;
@@ -100,14 +101,14 @@ impl Assumption {
     }
 }
 
-/// The standard errors of a pipeline's inputs: those that are stated, and for all others what
-/// [`Assumption::ALL`] assumes. Each in the unit of its [`Assumption`].
+/// The standard errors of a pipeline's inputs: the stated ones, and the defaults of
+/// [`Assumption::ALL`] for all others. Each is in the unit of its [`Assumption`].
 ///
 /// ```
 /// use tactile_imaging::force::Source;
 /// use tactile_imaging::pipeline::Assumptions;
 /// let mut errors = Assumptions::default();
-/// // A ball of 3 mm, known to 5 µm by a calliper.
+/// // A ball of 3 mm, measured to 5 µm with a calliper.
 /// errors.state(Source::ObjectSize, 5e-6 / 3e-3);
 /// assert_eq!(errors.stated(Source::ObjectSize), Some(5e-6 / 3e-3));
 /// assert_eq!((errors.stated(Source::Coupling), errors.error(Source::Coupling)), (None, 0.12));
@@ -117,20 +118,20 @@ impl Assumption {
 pub struct Assumptions(Vec<(Source, f64)>);
 
 impl Assumptions {
-    /// States the standard error of a source. One that is negative, not finite, or of a source
-    /// that is measured, is refused by
-    /// [`Pipeline::with_settings`](crate::pipeline::Pipeline::with_settings).
+    /// States the standard error of a source.
+    /// [`Pipeline::with_settings`](crate::pipeline::Pipeline::with_settings) rejects an error that
+    /// is negative or not finite, and one of a source that is measured.
     pub fn state(&mut self, source: Source, error: f64) {
         self.forget(source);
         self.0.push((source, error));
     }
 
-    /// The error of a source is assumed again.
+    /// Returns a source to its default error.
     pub fn forget(&mut self, source: Source) {
         self.0.retain(|(stated, _)| *stated != source);
     }
 
-    /// States all that `others` state.
+    /// Adopts all errors stated in `others`.
     pub(super) fn state_all(&mut self, others: &Self) {
         others
             .0
@@ -138,14 +139,14 @@ impl Assumptions {
             .for_each(|&(source, error)| self.state(source, error));
     }
 
-    /// The error that is stated of a source. `None` if it is assumed.
+    /// The stated error of a source. `None` if the default applies.
     #[must_use]
     pub fn stated(&self, source: Source) -> Option<f64> {
         let found = self.0.iter().find(|(stated, _)| *stated == source);
         found.map(|&(_, error)| error)
     }
 
-    /// The error of a source, stated or assumed. Zero of one that is measured.
+    /// The stated or default error of a source. Zero for a measured source.
     #[must_use]
     pub fn error(&self, source: Source) -> f64 {
         let assumed = || Assumption::of(source).map_or(0.0, |assumption| assumption.default);
@@ -164,16 +165,16 @@ impl Assumptions {
     }
 }
 
-/// The gain that presses of known force show. Forces that are read from light are divided by it,
-/// and its error stands in place of that of [`Source::Coupling`].
+/// The gain of the sensor according to presses of known force. Forces read from light are divided
+/// by it, and its error replaces that of [`Source::Coupling`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct CheckedGain {
-    /// Force that is read over force that is known.
+    /// Measured force over known force.
     pub gain: Estimate,
-    /// Standard deviation of the gain between presses beyond their own errors, relative. The error
-    /// of the gain allows for it, and for 0.5 % where it is less.
+    /// Relative standard deviation of the gain between presses beyond their own errors. The error
+    /// of the gain includes it, or 0.5 % if it is smaller.
     pub drift: f64,
     /// The number of presses.
     pub presses: usize,
@@ -195,13 +196,14 @@ impl Display for CheckedGain {
     }
 }
 
-/// What presses of balls of known modulus show of the guide's layers. The layers of the pipeline
-/// and their covariance are those after the presses.
+/// The stiffness of the guide according to presses of balls of known modulus. The pipeline then
+/// uses the updated layers and their covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct CheckedGuide {
-    /// Stiffness of the guide under contacts of the presses' mean radius, over that as stated.
+    /// Stiffness of the guide for contacts of the presses' mean radius, relative to the stated
+    /// value.
     pub stiffness: Estimate,
     /// The number of presses.
     pub presses: usize,

@@ -1,4 +1,5 @@
-//! Many frames at once: serial, or over threads with the feature `rayon`. The bits are the same.
+//! Many frames in one call: serial, or parallel with the feature `rayon`. The results are bitwise
+//! equal.
 use super::contact::{ContactReading, FrameContact};
 use super::error::PipelineError;
 use super::pipeline::Pipeline;
@@ -8,8 +9,8 @@ use std::sync::Arc;
 
 type Reading = Result<Option<ContactReading>, PipelineError>;
 
-/// Contact and force of every frame, in order. Workspaces are reused from frame to frame (one a
-/// thread with the feature `rayon`, whose pool decides how many).
+/// Contact and force of each frame, in order. Workspaces are reused from frame to frame (one per
+/// thread of the current pool with the feature `rayon`).
 ///
 /// ```
 /// use tactile_imaging::pipeline::contacts;
@@ -25,8 +26,8 @@ type Reading = Result<Option<ContactReading>, PipelineError>;
 /// ```
 ///
 /// # Errors
-/// [`PipelineError::Sensor`] for a reference without pixels. A frame's own trouble stands in its
-/// place.
+/// [`PipelineError::Sensor`] for a reference without pixels. The error of a frame takes its place
+/// in the result.
 pub fn contacts(
     pipeline: &Pipeline,
     reference: ArrayView2<'_, u8>,

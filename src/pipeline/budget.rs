@@ -1,11 +1,11 @@
-//! Which inputs the error of a modulus comes from, and which of them were assumed.
+//! Error budget of a modulus: its sources, and which of them are defaults.
 use super::assumptions::Assumption;
 use super::settings::Settings;
 use crate::core::{Source, Uncertain};
 use std::fmt::{self, Display, Formatter};
 
-/// The part of a modulus' relative standard error that one source is responsible for. The parts'
-/// squares add up to the whole.
+/// The contribution of one source to the relative standard error of a modulus. The squares of the
+/// contributions add up to the total.
 ///
 /// ```
 /// use tactile_simulate::Trial;
@@ -27,11 +27,11 @@ use std::fmt::{self, Display, Formatter};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ErrorShare {
-    /// The source.
+    /// The error source.
     pub source: Source,
-    /// Its standard error's part in the modulus, relative to the modulus.
+    /// Contribution of the source to the standard error, relative to the modulus.
     pub relative_error: f64,
-    /// Nothing was stated of the input: its error is the default of [`Settings`].
+    /// Whether the error of the input is a default of [`Settings`] rather than stated.
     pub assumed: bool,
 }
 
@@ -43,7 +43,7 @@ impl Display for ErrorShare {
     }
 }
 
-/// The least effort that makes a source's error smaller.
+/// The easiest way to reduce the error of a source.
 fn remedy(source: Source) -> &'static str {
     match (Assumption::of(source), source) {
         (Some(assumption), _) => assumption.remedy,
@@ -55,8 +55,8 @@ fn remedy(source: Source) -> &'static str {
     }
 }
 
-/// The budget in one sentence, shares below a tenth of the largest left out, and what would narrow
-/// the interval most.
+/// The budget in one sentence, and the best way to narrow the interval. Contributions below a tenth
+/// of the largest are left out.
 pub(super) fn sentence(budget: &[ErrorShare]) -> Option<String> {
     let largest = budget.first()?;
     let counts = |share: &&ErrorShare| share.relative_error >= 0.1 * largest.relative_error;
@@ -72,7 +72,7 @@ pub(super) fn sentence(budget: &[ErrorShare]) -> Option<String> {
     ))
 }
 
-/// The sources of a modulus' error, the largest part first. None of an error that is not known.
+/// The sources of a modulus' error, the largest contribution first. Empty if the error is unknown.
 pub(super) fn error_budget(modulus_pa: &Uncertain, settings: &Settings) -> Vec<ErrorShare> {
     if !modulus_pa.relative_error().is_finite() {
         return Vec::new();

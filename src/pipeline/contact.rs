@@ -1,4 +1,4 @@
-//! The first stage: one frame to contact, force, centroid and radius.
+//! The first stage: from a frame to contact, force, centroid and radius.
 use super::error::PipelineError;
 use crate::force::{
     BoundingBox, Estimate, FaceReading, ForceError, ForceMeasurement, ForceWorkspace, LensGeometry,
@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 use std::ops::Deref;
 use std::sync::Arc;
 
-/// One frame to contact and force.
+/// Finds contact and force in one frame.
 ///
 /// ```
 /// use ndarray::ArrayView2;
@@ -23,7 +23,7 @@ use std::sync::Arc;
 ///         10 + (peak * (1.0 - d * d).sqrt()).round() as u8
 ///     })
 /// };
-/// /// The contact by its light, the force of a spring scale that stands at 0.98 N.
+/// /// The contact from its light, and a force of 0.98 N read from a spring scale.
 /// struct OnScale(LightContact);
 /// impl ContactStage for OnScale {
 ///     fn measure(
@@ -43,8 +43,8 @@ use std::sync::Arc;
 /// }
 /// let (reference, frame) = (hertz(0.0), hertz(120.0));
 /// let stage = OnScale(LightContact::from_pairs(&pairs, [50e-6; 2])?);
-/// // Neither a lens nor a local curve: coordinates stand as they are, shading is taken from the
-/// // light.
+/// // There is neither a lens nor a local curve: coordinates stay as they are, and shading is
+/// // taken from the light.
 /// assert!(stage.lens().is_none() && stage.pressure_curve().is_none());
 /// let pipeline = Pipeline::new(stage, Object::sphere(3e-3))?;
 /// let mut press = pipeline.press(reference.view())?;
@@ -53,8 +53,8 @@ use std::sync::Arc;
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
 pub trait ContactStage: Send + Sync {
-    /// The contact of `frame`, which differs from `reference` by it. A reading without a force
-    /// takes that of a gauge, where there is one.
+    /// The contact in `frame`, compared with `reference`. If the reading has no force, a gauge
+    /// reading takes its place.
     ///
     /// # Errors
     /// [`ForceError`], such as a frame of another size or a saturated contact.
@@ -64,11 +64,11 @@ pub trait ContactStage: Send + Sync {
         reference: &ReferenceFrame,
     ) -> Result<FrameContact, ForceError>;
 
-    /// The size of a pixel in metres, x and y. That at the centre of distortion where there is a
-    /// [`lens`](Self::lens).
+    /// The size of a pixel in metres, x and y. With a [`lens`](Self::lens) it is the size at the
+    /// centre of distortion.
     fn pixel_size_m(&self) -> [f64; 2];
 
-    /// As [`measure`](Self::measure), in memory that a stream keeps from frame to frame.
+    /// Like [`measure`](Self::measure), with memory that a stream reuses from frame to frame.
     ///
     /// # Errors
     /// Those of [`measure`](Self::measure).
@@ -84,25 +84,25 @@ pub trait ContactStage: Send + Sync {
         Ok(())
     }
 
-    /// Whether contact makes the frame brighter or darker.
+    /// Whether a contact is brighter or darker than the reference.
     fn polarity(&self) -> Polarity {
         Polarity::Brighter
     }
 
-    /// The lens that distorts, if there is one: control points are undistorted by it.
+    /// The distorting lens, if there is one. It is used to undistort control points.
     fn lens(&self) -> Option<&LensGeometry> {
         None
     }
 
-    /// The local curve from grey level to pressure, if there is one: shading is taken from
+    /// The local curve from grey level to pressure, if there is one. Shading is then taken from
     /// pressures instead of light.
     fn pressure_curve(&self) -> Option<&dyn LocalCalibration> {
         None
     }
 
-    /// The stage to take for objects that are known to have a flat face, if it saves work that only
-    /// a ball's contact needs, such as the fit of its profile. The contact radius is then taken
-    /// from the face's area.
+    /// A variant of the stage for objects with a flat face, if it saves work that only a ball's
+    /// contact needs, such as the fit of its profile. The contact radius then follows from the area
+    /// of the face.
     ///
     /// ```
     /// use tactile_imaging::pipeline::{ContactStage, LightContact};
@@ -115,7 +115,7 @@ pub trait ContactStage: Send + Sync {
     }
 }
 
-/// Boxed, shared and borrowed stages.
+/// Implements the trait for boxed, shared and borrowed stages.
 impl<P: Deref<Target: ContactStage> + Send + Sync> ContactStage for P {
     fn measure(
         &self,
@@ -182,46 +182,46 @@ impl<P: Deref<Target: ContactStage> + Send + Sync> ContactStage for P {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct ContactReading {
-    /// Normal force in newtons. `None` where neither calibration nor gauge gives it.
+    /// Normal force in newtons. `None` if neither calibration nor gauge gives it.
     pub force_n: Option<Uncertain>,
-    /// Contact radius in metres. Of a flat face √(A/π), that of a disc of its area.
+    /// Contact radius in metres. For a flat face it is √(A/π), the radius of a disc of equal area.
     pub contact_radius_m: Uncertain,
-    /// Indentation in metres, where the sensor measures depth.
+    /// Indentation in metres. `None` if the sensor does not measure depth.
     pub indentation_m: Option<Estimate>,
     /// Centroid (x, y) in pixels.
     pub centroid_px: [Estimate; 2],
     /// Area of the contact in square metres.
     pub area_m2: f64,
-    /// Greatest signal: grey levels above (or below) the reference.
+    /// Largest signal: grey levels above (or below) the reference.
     pub peak_grey: f64,
-    /// Stress at the contact's centre in pascals, where the sensor is calibrated.
+    /// Stress at the centre of the contact in pascals. `None` without a calibration.
     pub peak_stress_pa: Option<Uncertain>,
-    /// Share of the contact's pixels that are saturated.
+    /// Fraction of the contact's pixels that are saturated.
     pub saturated_share: f64,
-    /// The signal lies outside the range of the calibration.
+    /// Whether the signal is outside the range of the calibration.
     pub out_of_calibration: bool,
-    /// The contact reaches the frame's edge: part of it may be missing.
+    /// Whether the contact reaches the edge of the frame, so that part of it may be missing.
     pub touches_edge: bool,
-    /// Other contacts in the frame: this one is the largest.
+    /// Number of other contacts in the frame. This one is the largest.
     pub other_contacts: usize,
-    /// Whether the fit of the contact's profile converged (no fit counts as converged).
+    /// Whether the fit of the contact's profile converged. `true` without a fit.
     pub converged: bool,
-    /// Misfit of the pressure's profile as a share of its peak, where it is not that of a ball's
-    /// contact.
+    /// Misfit of the pressure profile, as a fraction of its peak. `None` if it is the profile of a
+    /// ball's contact.
     pub profile_misfit: Option<f64>,
-    /// The contact as a flat face, where the object may have one and the contact is large enough to
-    /// tell.
+    /// The contact as a flat face. `None` if the object cannot have one or the contact is too
+    /// small.
     pub face: Option<FaceReading>,
-    /// Longer over shorter half axis of the outline, less one, where it is not round.
+    /// Longer over shorter half axis of the outline, minus one. `None` if the outline is round.
     pub elongation: Option<f64>,
-    /// Departure of the calibration's pairs from a line at half scale, as a share of the full
-    /// scale, where the pairs show one.
+    /// Deviation of the calibration pairs from a line at half scale, as a fraction of the full
+    /// scale. `None` if it is not significant.
     pub calibration_bend: Option<f64>,
 }
 
 impl ContactReading {
-    /// A round contact of this radius under this force, about which there is nothing to caution.
-    /// The errors count as noise of the frame, the peak as one grey level.
+    /// A round contact of this radius under this force, without cautions. The errors count as noise
+    /// of the frame, and the peak is one grey level.
     ///
     /// ```
     /// use tactile_imaging::force::{Estimate, Source};
@@ -254,7 +254,7 @@ impl ContactReading {
         }
     }
 
-    /// F/(π a²) in pascals. `None` where the force is not known.
+    /// F/(π a²) in pascals. `None` if the force is unknown.
     ///
     /// ```
     /// use tactile_imaging::{force::Estimate, pipeline::ContactReading};
@@ -267,10 +267,10 @@ impl ContactReading {
         Some(self.force_n? / (self.contact_radius_m.powf(2.0) * PI))
     }
 
-    /// The relative error of lengths that a caution about the shape stands for. Pixels whose sides
-    /// are wrongly stated, or a lens, make the longer half axis wrong by all of the elongation and
-    /// their mean by half of it, and a profile that is another by a share of its peak has another
-    /// radius by about as much.
+    /// The relative error of lengths that corresponds to a caution about the shape. If pixel sizes
+    /// are misstated or a lens distorts, the longer half axis is wrong by the whole elongation and
+    /// the mean of both by half of it. If the profile deviates by a fraction of its peak, the
+    /// radius deviates by approximately the same fraction.
     pub(super) fn shape_doubt(&self) -> f64 {
         let elongation = 0.5 * self.elongation.unwrap_or(0.0);
         let misfit = self.profile_misfit.unwrap_or(0.0);
@@ -278,14 +278,14 @@ impl ContactReading {
         elongation.hypot(misfit).hypot(bend)
     }
 
-    /// The contact is a flat face of that area: the radius is that of a disc as large.
+    /// Sets the radius to that of a disc with the area of the flat face.
     pub(super) fn take_area(&mut self, area_m2: Estimate) {
         self.area_m2 = area_m2.value;
         let area = Uncertain::from(area_m2) * PI.recip();
         self.contact_radius_m = area.powf(0.5);
     }
 
-    /// The reading of a measured force. `None` without contact.
+    /// The reading from a measured force. `None` without contact.
     pub(super) fn of_light(force: &ForceMeasurement) -> Option<Self> {
         let (contact, reading, radius) = (force.contact?, force.reading?, force.contact_radius_m?);
         let profile = force.profile;
@@ -309,7 +309,7 @@ impl ContactReading {
     }
 }
 
-/// Answer of the first stage: the reading, and where in the frame the contact is.
+/// Result of the first stage: the reading, and the position of the contact in the frame.
 ///
 /// ```
 /// use tactile_imaging::force::ReferenceFrame;
@@ -326,7 +326,7 @@ impl ContactReading {
 /// let region = contact.region.expect("a contact");
 /// assert_eq!(contact.mask.dim(), (region.rows(), region.columns()));
 /// assert!(region.row_start <= 12 && region.row_end >= 52, "20 pixels around row 32");
-/// // Without contact: how far the light is from the reference's.
+/// // Without contact: the difference of the light from the reference.
 /// let contact = stage.measure(hertz(0.0).view(), &reference)?;
 /// assert_eq!((contact.reading, contact.background_step_grey), (None, Some(0.0)));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -336,19 +336,19 @@ impl ContactReading {
 pub struct FrameContact {
     /// The reading. `None` without contact.
     pub reading: Option<ContactReading>,
-    /// The box worked on: the contact's, with a margin of at least one pixel (but at the frame's
-    /// edge).
+    /// The processed box: the contact with a margin of at least one pixel, except at the edge of
+    /// the frame.
     pub region: Option<BoundingBox>,
     /// The contact's pixels within the box.
     pub mask: Array2<bool>,
-    /// Frame minus reference in grey levels where nothing touches: the mean of a frame without
-    /// contact, the median outside of one. `None` where it is not known.
+    /// Frame minus reference in grey levels outside contacts: the mean of a frame without contact,
+    /// otherwise the median outside the contact. `None` if it is unknown.
     pub background_step_grey: Option<f64>,
 }
 
 impl FrameContact {
-    /// A contact whose pixels are the true ones of `mask`, an image as large as the frame. No pixel
-    /// is no contact.
+    /// A contact whose pixels are the true ones of `mask`, an image as large as the frame. An empty
+    /// mask means no contact.
     ///
     /// ```
     /// use tactile_imaging::{
@@ -377,10 +377,10 @@ impl FrameContact {
         }
     }
 
-    /// Number of the contact's pixels.
+    /// Number of pixels in the contact.
     pub(super) fn pixels(&self) -> usize {
         let count = |pixels: &[bool]| {
-            // Short runs fit a byte, whose sums are wide instructions.
+            // Sums over short runs fit in a byte, which vectorises well.
             let sum = |run: &[bool]| run.iter().map(|inside| u8::from(*inside)).sum::<u8>();
             pixels.chunks(128).map(|run| usize::from(sum(run))).sum()
         };
@@ -390,7 +390,7 @@ impl FrameContact {
         }
     }
 
-    /// The smallest box of the frame that holds the contact's pixels: `region` may be wider.
+    /// The smallest box of the frame that contains the contact's pixels. `region` may be larger.
     pub(super) fn bounds(&self) -> Option<BoundingBox> {
         let region = self.region?;
         let bounds = BoundingBox::of_mask(self.mask.view())?;
@@ -402,8 +402,8 @@ impl FrameContact {
         })
     }
 
-    /// Refuses a mask that does not fill its region, and a region that does not lie in the frame: a
-    /// stage may be a user's own.
+    /// Rejects a mask that does not match its region, and a region that is not inside the frame,
+    /// because a stage may be user-defined.
     pub(super) fn check(&self, frame: usize, image: (usize, usize)) -> Result<(), PipelineError> {
         let Some(at) = self.region else {
             return Ok(());
@@ -427,7 +427,7 @@ impl FrameContact {
     }
 }
 
-/// Gives an array a shape, keeping its memory where it is large enough.
+/// Changes the shape of an array, reusing its memory if possible.
 pub(super) fn resize<T: Clone + Default>(array: &mut Array2<T>, shape: (usize, usize)) {
     if array.dim() != shape {
         let (mut memory, _) = std::mem::take(array).into_raw_vec_and_offset();

@@ -1,6 +1,6 @@
-//! Sensors that grow darker with depth: contact by a threshold, depth by a table.
+//! Sensors that darken with depth: contact by a threshold, depth by a table.
 //!
-//! Such a sensor measures shape, not force: a force must come from a gauge.
+//! Such a sensor measures shape, not force. The force must come from a gauge.
 use super::contact::{ContactReading, ContactStage, FrameContact};
 use super::error::PipelineError;
 use crate::force::{Estimate, ForceError, Polarity, ReferenceFrame};
@@ -8,13 +8,13 @@ use crate::gel::DarkGel;
 use crate::sfs::DepthTable;
 use ndarray::ArrayView2;
 
-/// Contact is the largest connected patch that is darker than the reference by more than a
+/// The contact is the largest connected region that is darker than the reference by more than a
 /// threshold.
 ///
 /// ```
 /// use ndarray::Array2;
 /// use tactile_imaging::pipeline::{ContactStage, DarkContact, Object, Pipeline, SurfaceInput};
-/// // A hundred grey levels darker is half a millimetre deep.
+/// // A hundred grey levels of darkening are half a millimetre of depth.
 /// let table = [(0.0, 0.0), (100.0, 0.5e-3)];
 /// let contact = DarkContact::new(&table, [0.1e-3; 2])?;
 /// assert_eq!(contact.pixel_size_m(), [0.1e-3; 2]);
@@ -38,11 +38,10 @@ pub struct DarkContact {
 }
 
 impl DarkContact {
-    /// Darkening that counts as contact: above the noise of an 8-bit camera.
+    /// Darkening that counts as contact. It is above the noise of an 8-bit camera.
     pub const DEFAULT_THRESHOLD_GREY: f64 = 3.0;
 
-    /// With a table of (darkness in grey levels, depth in metres), read as by
-    /// [`depth_table`](Self::depth_table).
+    /// Creates the stage from a table of (darkness in grey levels, depth in metres), interpreted by
     ///
     /// # Errors
     /// [`PipelineError::DepthTable`], and [`PipelineError::Setting`] for sizes that are not positive.
@@ -54,21 +53,21 @@ impl DarkContact {
         })
     }
 
-    /// The gel, which reads the other contacts too.
+    /// The gel, which also measures the other contacts.
     pub fn gel(&self) -> &DarkGel {
         &self.gel
     }
 
-    /// The table as a reconstruction, zero where there is no contact.
+    /// The table as a reconstruction, with zero depth outside the contact.
     ///
-    /// No darkness is no depth. A table with the entry (0, 0) is read as it stands. Another counts
-    /// its depths from a contact circle that was found at some darkness, and it is
-    /// [zeroed](DepthTable::zeroed) where it determines its zero. Where it does not it is read as
-    /// it stands. Entries at or below the threshold of contact and negative ones are left out.
+    /// No darkness means no depth. A table with the entry (0, 0) is used unchanged. In other
+    /// tables, depths are counted from a contact circle that was first visible at some darkness: if
+    /// the table determines its zero, it is [zeroed](DepthTable::zeroed), otherwise it is used
+    /// unchanged. Negative entries and entries at or below the contact threshold are dropped.
     ///
     /// ```
     /// use tactile_imaging::pipeline::DarkContact;
-    /// // A level is 30 µm deep, and depth was counted from where three levels were seen.
+    /// // One level is 30 µm deep, and depth was counted from the first three visible levels.
     /// let mut table: Vec<_> = (3..60).map(|s| (f64::from(s), 30e-6 * f64::from(s - 3))).collect();
     /// assert!((DarkContact::depth_table(&table)?.depth(10.0).0 - 0.30e-3).abs() < 1e-12);
     /// table.insert(0, (0.0, 0.0));
@@ -124,7 +123,7 @@ impl ContactStage for DarkContact {
         let [hx, hy] = self.pixel_size_m;
         let pixel = (hx * hy).sqrt();
         let radius_px = (count / std::f64::consts::PI).sqrt();
-        // Specks of noise are patches too: other contacts are not counted.
+        // Specks of noise are also regions, so other contacts are not counted.
         let reading = ContactReading {
             saturated_share: black / count,
             indentation_m: Some(patch.depth_m),

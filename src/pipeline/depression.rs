@@ -4,22 +4,25 @@ use crate::core::Estimate;
 use crate::elasticity::contact::{Bond, Waveguide, depression_m};
 use crate::elasticity::modulus::Bodies;
 
-/// Relative standard error of the depth by large strain: this much of depth over contact radius,
-/// up to [`MOST_SLOPE`], and this much of depth over thickness. The law is for small strains.
+/// Relative standard error of the depth because of large strain: this factor times depth over
+/// contact radius, up to [`MOST_SLOPE`], and times depth over thickness. The law assumes small
+/// strains.
 const SLOPE_ERROR: f64 = 0.075;
 const COMPRESSION_ERROR: f64 = 0.1;
 const MOST_SLOPE: f64 = 0.5;
 
-/// Relative standard error at a/h = 1 by the flatter pressure on thin layers. It goes as (a/h)².
+/// Relative standard error at a/h = 1 because the pressure on thin layers is flatter. It is
+/// proportional to (a/h)².
 ///
-/// These three leave 95 of 100 intervals true beside finite elements at a/R up to 1.15 and a/h up
-/// to 1.4 (`PRESSES=48 cargo test --release --test suite depressions`).
+/// With these three constants, 95 of 100 intervals contain the truth compared with finite elements,
+/// for a/R up to 1.15 and a/h up to 1.4
+/// (`PRESSES=48 cargo test --release --test suite depressions`).
 const THIN_LAYER_ERROR: f64 = 0.025;
 
-/// Depths in metres at distances from the contact's centre. `None` where the force is not known or
+/// Depths in metres at distances from the centre of the contact. `None` if the force is unknown or
 /// the guide has no layers.
 ///
-/// The errors of force, contact radius and layers count, and that of the law.
+/// The error combines those of force, contact radius, layers and law.
 pub(super) fn depths(
     contact: &ContactReading,
     bodies: &Bodies,
@@ -33,12 +36,13 @@ pub(super) fn depths(
         .collect();
     let found = depression_m(guide, Bond::Bonded, force.value, radius.value, &places).ok()?;
     let (&greatest, asked) = found.split_first()?;
-    // On a half-space the depth on the axis goes as 1/a, on layers and elsewhere it changes less.
+    // On a half-space the depth on the axis is proportional to 1/a. On layers and off the axis it
+    // varies less.
     let share = law_error(guide, radius.value, greatest)
         .hypot(force.relative_error())
         .hypot(radius.relative_error())
         .hypot(bodies.guide_compliance(radius.value).standard_error());
-    // The law is off by a share of the greatest depth, at the rim too.
+    // The error of the law is a fraction of the largest depth, also at the rim.
     let depth = |&depth_m: &f64| Estimate::new(depth_m, share * greatest);
     Some(asked.iter().map(depth).collect())
 }

@@ -1,4 +1,4 @@
-//! Why a measurement could not be made.
+//! Errors of a measurement.
 use crate::core::InvalidOption;
 use crate::elasticity::ElasticityError;
 use crate::force::{ForceError, ShapeProblem};
@@ -6,8 +6,7 @@ use crate::matching::MatchError;
 use crate::sfs::SfsError;
 use crate::tps::TpsError;
 
-/// Why a measurement could not be made. Frames are counted from 0 in the fields and from 1 in the
-/// sentences.
+/// Why a measurement failed. Frames are counted from 0 in the fields and from 1 in the messages.
 ///
 /// ```
 /// use tactile_imaging::pipeline::{Object, Pipeline, PipelineError};
@@ -27,41 +26,41 @@ use crate::tps::TpsError;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PipelineError {
-    /// The reference or the pipeline's own options are not usable.
+    /// The reference or the options of the pipeline are invalid.
     #[error("the sensor's description is not usable: {0}")]
     Sensor(#[source] ForceError),
-    /// The calibration could not be fitted.
+    /// The calibration cannot be fitted.
     #[error("the force calibration cannot be fitted: {0}")]
     Calibration(#[source] ForceError),
-    /// The options of the reconstruction or the sampler are not usable.
+    /// The options of the reconstruction or the sampler are invalid.
     #[error("the options of the surface stages are not usable: {0}")]
     SurfaceOptions(#[source] SfsError),
-    /// The options of the warp are not usable.
+    /// The options of the warp are invalid.
     #[error("the options of the warp are not usable: {0}")]
     WarpOptions(#[source] TpsError),
-    /// The depth table is not usable.
+    /// The depth table is invalid.
     #[error("the depth table is not usable: {0}")]
     DepthTable(#[source] SfsError),
-    /// The waveguide or the object is not physical.
+    /// The waveguide or the object is unphysical.
     #[error("the waveguide or the object is not physical: {0}")]
     Material(#[source] ElasticityError),
-    /// A press of known force is not usable.
+    /// A press of known force cannot be used.
     #[error("press {} of known force is not usable: {reason}", press + 1)]
     Check {
-        /// Which, counted from 0.
+        /// Index of the press, counted from 0.
         press: usize,
-        /// Why not.
+        /// The reason.
         reason: &'static str,
     },
     /// A setting of the pipeline is outside its range.
     #[error(transparent)]
     Setting(#[from] InvalidOption),
-    /// There is no frame of this number.
+    /// There is no frame with this index.
     #[error("there is no frame {}: the press has {frames}", frame + 1)]
     NoSuchFrame {
-        /// The frame asked for.
+        /// The requested frame.
         frame: usize,
-        /// How many there are.
+        /// Number of frames in the press.
         frames: usize,
     },
     /// A frame that is read on demand could not be read.
@@ -69,30 +68,30 @@ pub enum PipelineError {
     Unreadable {
         /// The frame.
         frame: usize,
-        /// What its reader said.
+        /// Message of the reader.
         reason: String,
     },
-    /// The surface of a frame was left out of a measurement of many.
+    /// The surface of this frame was not reconstructed, because the measurement has many frames.
     #[error(
-        "frame {}: no surface was reconstructed; of {frames} frames only those are whose strain \
-         is worked out (`Press::surface` gives any)",
+        "frame {}: no surface was reconstructed; of {frames} frames only those with a \
+         strain have one (`Press::surface` computes any)",
         frame + 1
     )]
     NotReconstructed {
         /// The frame.
         frame: usize,
-        /// How many there are.
+        /// Number of frames.
         frames: usize,
     },
-    /// A frame could not be read as a contact.
+    /// No contact could be measured in a frame.
     #[error("frame {}: {source}", frame + 1)]
     Contact {
         /// The frame.
         frame: usize,
-        /// Why.
+        /// The reason.
         source: ForceError,
     },
-    /// What a contact stage left behind does not fit the frame.
+    /// The result of a contact stage does not fit the frame.
     #[error(
         "frame {}: the contact stage gave a mask of {} × {} pixels for a box of {} × {} pixels in \
          a frame of {} × {}",
@@ -108,7 +107,7 @@ pub enum PipelineError {
         /// Rows and columns of the frame, in which the region must lie.
         image: (usize, usize),
     },
-    /// A frame shows no contact, but one is needed.
+    /// A frame shows no contact, but a contact is needed.
     #[error(
         "frame {} shows no contact: it does not differ from the reference by more than its noise",
         frame + 1
@@ -117,7 +116,7 @@ pub enum PipelineError {
         /// The frame.
         frame: usize,
     },
-    /// A frame shows no contact, but differs from the reference, the other way than a contact does.
+    /// A frame shows no contact, but its signal has the opposite sign of a contact.
     #[error(
         "frame {} shows no contact, though it is up to {:.0} grey levels {} than the reference: \
          were the two swapped, or has the light changed?",
@@ -128,12 +127,12 @@ pub enum PipelineError {
     OppositeSignal {
         /// The frame.
         frame: usize,
-        /// Frame minus reference where they differ most, in grey levels.
+        /// Largest difference of frame minus reference, in grey levels.
         grey: f64,
     },
-    /// The force of a frame is not known: no calibration and no gauge reading.
+    /// The force of a frame is unknown: there is neither a calibration nor a gauge reading.
     #[error(
-        "the force of frame {} is not known: without a calibration it takes a gauge reading \
+        "the force of frame {} is unknown: without a calibration a gauge reading is needed \
          (`force_N`)",
         frame + 1
     )]
@@ -141,9 +140,9 @@ pub enum PipelineError {
         /// The frame.
         frame: usize,
     },
-    /// The frame's edge cuts every contact: force and radius are those of a part.
+    /// The edge of the frame cuts every contact, so force and radius are incomplete.
     #[error(
-        "the frame's edge cuts every contact: no modulus can be read from a part of one, move the \
+        "the frame's edge cuts every contact, and a partial contact gives no modulus: move the \
          object to the middle of the frame"
     )]
     NoWholeContact,
@@ -155,26 +154,26 @@ pub enum PipelineError {
     Time {
         /// The frame.
         frame: usize,
-        /// What was given.
+        /// The time given.
         found_s: f64,
     },
-    /// Frames do not follow each other in time.
+    /// Frames are not in the order of time.
     #[error(
-        "frame {} was taken at {found_s} s, before the one that it follows ({before_s} s)",
+        "frame {} was taken at {found_s} s, before the preceding frame ({before_s} s)",
         frame + 1
     )]
     TimeDecreases {
         /// The frame.
         frame: usize,
-        /// The time of the last frame before it that has one.
+        /// Time of the last preceding frame that has one.
         before_s: f64,
-        /// Its own time.
+        /// Time of this frame.
         found_s: f64,
     },
-    /// A match and a strain take two frames.
-    #[error("a strain takes two frames, found {found}")]
+    /// Matches and strains need two frames.
+    #[error("a strain needs two frames, found {found}")]
     TooFewFrames {
-        /// How many there are.
+        /// Number of frames.
         found: usize,
     },
     /// No surface could be reconstructed.
@@ -182,7 +181,7 @@ pub enum PipelineError {
     Surface {
         /// The frame.
         frame: usize,
-        /// Why.
+        /// The reason.
         source: SfsError,
     },
     /// The control points could not be matched.
@@ -192,7 +191,7 @@ pub enum PipelineError {
         from: usize,
         /// The second frame.
         to: usize,
-        /// Why.
+        /// The reason.
         source: MatchError,
     },
     /// Too few control points have partners.
@@ -205,9 +204,9 @@ pub enum PipelineError {
         from: usize,
         /// The second frame.
         to: usize,
-        /// The least number.
+        /// Minimum number of partners.
         expected: usize,
-        /// How many there are.
+        /// Number found.
         found: usize,
     },
     /// The displacement between two frames has no warp.
@@ -217,32 +216,32 @@ pub enum PipelineError {
         from: usize,
         /// The second frame.
         to: usize,
-        /// Why.
+        /// The reason.
         source: TpsError,
     },
-    /// The strain between two frames does not exist.
+    /// The strain between two frames could not be computed.
     #[error("frames {} and {}: no strain: {source}", from + 1, to + 1)]
     Strain {
         /// The first frame.
         from: usize,
         /// The second frame.
         to: usize,
-        /// Why.
+        /// The reason.
         source: ElasticityError,
     },
-    /// A contact is not that of one flat face under uniaxial load, from which a modulus could be
-    /// read.
+    /// The contact is not a single flat face under uniaxial load, so no modulus can be derived from
+    /// it.
     #[error("frame {}: {problem}", frame + 1)]
     NotUniaxial {
         /// The frame.
         frame: usize,
-        /// Why.
+        /// The reason.
         problem: ShapeProblem,
     },
-    /// A flat face has no points that could be matched.
+    /// The points of a flat face cannot be matched.
     #[error(
-        "frames {} and {}: the points of a flat face are not matched, its strain is that of its \
-         outline",
+        "frames {} and {}: the points of a flat face cannot be matched; its strain follows from \
+         its outline",
         from + 1, to + 1
     )]
     FlatFace {
@@ -251,12 +250,12 @@ pub enum PipelineError {
         /// The second frame.
         to: usize,
     },
-    /// The estimator that was chosen is for another object.
+    /// The chosen estimator is for another object.
     #[error("the estimator \"{estimator}\" needs {needs}")]
     WrongEstimator {
-        /// Its name.
+        /// Name of the estimator.
         estimator: &'static str,
-        /// What it needs.
+        /// What the estimator needs.
         needs: &'static str,
     },
     /// The loads do not determine a modulus.
@@ -268,23 +267,22 @@ pub enum PipelineError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum PipelineErrorKind {
-    /// Settings, the calibration, the sensor's description or the object are not usable: state
-    /// others.
+    /// Settings, calibration, description of the sensor or object are invalid: change them.
     Options,
-    /// A frame, a time or a reading that was given is not usable: give another.
+    /// A frame, time or reading is invalid: supply another one.
     Input,
-    /// A frame of the press could not be read from where it is kept.
+    /// A frame of the press could not be read from its source.
     NotRead,
     /// A frame shows no contact.
     NoContact,
-    /// The frames do not determine the answer: more or other frames may.
+    /// The frames do not determine the result: more or other frames may.
     NotDetermined,
-    /// A stage of the caller's own failed.
+    /// A user-defined stage failed.
     OwnStage,
 }
 
 impl PipelineError {
-    /// What a caller can do about it.
+    /// What a caller can do about this error.
     ///
     /// ```
     /// use tactile_imaging::pipeline::{PipelineError, PipelineErrorKind};
@@ -346,7 +344,7 @@ impl PipelineError {
         }
     }
 
-    /// The frame that the trouble comes from, counted from 0. `None` if it comes from no single one.
+    /// The frame that caused the error, counted from 0. `None` if there is no single one.
     ///
     /// ```
     /// use tactile_imaging::pipeline::PipelineError;

@@ -1,4 +1,4 @@
-//! The modulus estimators: the default one, and those behind the names of a configuration.
+//! The modulus estimators: the default, and those selected by name in a configuration.
 use super::error::PipelineError;
 use super::specimen::Object;
 use super::stage_names::EstimatorChoice;
@@ -11,14 +11,14 @@ use crate::elasticity::modulus::{
 };
 use std::sync::{Arc, OnceLock};
 
-/// An estimator that pipelines and their clones share.
+/// An estimator, shared by pipelines and their clones.
 pub(super) type SharedEstimator = Arc<dyn ModulusEstimator + Send + Sync>;
 
-/// The estimator where none is chosen. This is the place to change the default.
+/// The default estimator. To change the default, change it here.
 ///
-/// A ball: the linear contact with the waveguide's layers, or with a rigid flat, corrected for
-/// finite strain. A sample on a rigid base, a cone: their own laws. Else stress over strain,
-/// equation (31). Of a flat face regressed over all loads.
+/// For a ball it is the linear contact with the waveguide's layers, or with a rigid flat, corrected
+/// for finite strain. A sample on a rigid base and a cone have their own laws. For any other object
+/// it is stress over strain, equation (31); for a flat face, this ratio regressed over all loads.
 fn default_of(
     object: Object,
     waveguide: Option<&Waveguide>,
@@ -39,8 +39,8 @@ fn default_of(
     }
 }
 
-/// Estimators to lay beside the chosen one, the paper's ratio first. For a ball Hertz with the
-/// layers in series.
+/// Estimators shown next to the chosen one, the paper's ratio first. For a ball Hertz's law with
+/// the layers in series is included.
 pub(super) fn that_fit(
     object: Object,
     waveguide: Option<&Waveguide>,
@@ -69,7 +69,7 @@ pub(super) fn that_fit(
     Ok(estimators.into_iter().map(completed).collect())
 }
 
-/// The estimator of a name.
+/// The estimator with a given name.
 fn named(
     choice: EstimatorChoice,
     object: Object,
@@ -112,7 +112,7 @@ fn named(
     built.map_err(PipelineError::Material)
 }
 
-/// A ball on the layers of a waveguide. On a rigid flat where they are not known.
+/// A ball on the layers of a waveguide, or on a rigid flat if the layers are unknown.
 fn on_waveguide(
     radius_m: f64,
     poisson_ratio: f64,
@@ -123,7 +123,7 @@ fn on_waveguide(
     SphereOnWaveguide::new(radius_m, poisson_ratio, guide, Bond::Bonded)
 }
 
-/// Stress over strain, counted from the first load, as the paper matches two pressed frames.
+/// Stress over strain, counted from the first load, because the paper matches two pressed frames.
 fn paper_ratio(object: Object) -> Result<PaperRatio, ElasticityError> {
     let ratio = PaperRatio::default().with_reference(StrainReference::FirstLoad);
     match object.sphere_radius_m() {
@@ -136,7 +136,7 @@ fn shared(estimator: impl ModulusEstimator + 'static) -> Result<SharedEstimator,
     Ok(Arc::new(estimator))
 }
 
-/// An estimator to whose loads the object and the guide are added if they come without.
+/// An estimator that adds the object and the guide to loads that lack them.
 struct Completed {
     estimator: SharedEstimator,
     bodies: Arc<Bodies>,
@@ -147,7 +147,7 @@ impl Completed {
         Arc::new(Self { estimator, bodies })
     }
 
-    /// The answer is from contacts alone, with a guide that yields, and does not count it.
+    /// Whether the result uses contacts on a compliant guide but ignores the guide.
     fn ignores_guide(&self) -> bool {
         let counted = self.estimator.needs_strain() || self.estimator.counts_guide();
         self.bodies.guide().is_some() && !counted
@@ -170,7 +170,7 @@ impl ModulusEstimator for Completed {
         Ok(estimate)
     }
 
-    /// Its own. A law of this crate without the guide has not the name of one with it.
+    /// The kind of the inner estimator. A law of this crate without the guide gets another name.
     fn kind(&self) -> EstimatorKind {
         match self.estimator.kind() {
             EstimatorKind::Other(name) => EstimatorKind::Other(name),
@@ -188,12 +188,12 @@ impl ModulusEstimator for Completed {
     }
 }
 
-/// A pipeline's estimator: given as a value, or by a name. It is completed by the object and the
-/// guide when it is first needed.
+/// The estimator of a pipeline, given as a value or by name. The object and the guide are added
+/// when it is first needed.
 #[derive(Clone)]
 pub(super) struct EstimatorStage {
     chosen: Chosen,
-    /// Clones share what is built: a law may hold tables.
+    /// The completed estimator, shared by clones because a law may hold tables.
     built: Arc<OnceLock<Result<SharedEstimator, PipelineError>>>,
 }
 
@@ -218,7 +218,7 @@ impl EstimatorStage {
         }
     }
 
-    /// The object or the waveguide has changed: it is completed anew.
+    /// Discards the completed estimator after a change of object or waveguide.
     pub(super) fn renew(&mut self) {
         self.built = Arc::default();
     }

@@ -1,11 +1,11 @@
-//! Typed cautions: the result stands, but not unconditionally.
+//! Typed cautions: the result holds with a reservation.
 use super::contact::ContactReading;
 use super::error::PipelineError;
 use crate::elasticity::modulus::Warning;
 use crate::force::Estimate;
 
-/// A caution about a result. Frames are counted from 0 in the fields and from 1 in the sentences.
-/// It is an [`Error`](std::error::Error) too, for those who take no result with a caution.
+/// A caution about a result. Frames are counted from 0 in the fields and from 1 in the messages. It
+/// also implements [`Error`](std::error::Error), for callers that reject results with a caution.
 ///
 /// ```
 /// use tactile_imaging::force::{CalibrationPair, Estimate};
@@ -41,15 +41,15 @@ use crate::force::Estimate;
 )]
 #[non_exhaustive]
 pub enum Flag {
-    /// Some of the contact's pixels are saturated: force and radius are low.
+    /// Some of the contact's pixels are saturated, so force and radius are too low.
     #[error("frame {}: {:.2} % of the contact is saturated", frame + 1, 100.0 * share)]
     Saturated {
         /// The frame.
         frame: usize,
-        /// Share of the contact's pixels.
+        /// Fraction of the contact's pixels.
         share: f64,
     },
-    /// The signal lies outside the range of the calibration.
+    /// The signal is outside the range of the calibration.
     #[error("frame {}: outside the range of the calibration", frame + 1)]
     OutOfCalibration {
         /// The frame.
@@ -61,11 +61,11 @@ pub enum Flag {
         /// The frame.
         frame: usize,
     },
-    /// The contact is wider than the frame: most of it is not seen, or the light has changed
-    /// everywhere.
+    /// The contact is wider than the frame: most of it is outside the view, or the light has
+    /// changed everywhere.
     #[error(
-        "frame {}: the contact, {:.3} mm in radius, is wider than the frame: its size cannot be \
-         told",
+        "frame {}: the contact, {:.3} mm in radius, is wider than the frame: its size is \
+         undetermined",
         frame + 1, 1e3 * radius_m
     )]
     WiderThanFrame {
@@ -74,35 +74,36 @@ pub enum Flag {
         /// Contact radius in metres.
         radius_m: f64,
     },
-    /// A number whose error is larger than the number.
+    /// The standard error of a number is larger than the number.
     #[error(
-        "frame {}: the {quantity} cannot be told, its error ({}) is larger than its value ({})",
+        "frame {}: the {quantity} is undetermined: its error ({}) is larger than its value ({})",
         frame + 1, in_unit(quantity, *standard_error), in_unit(quantity, *value)
     )]
     CannotBeTold {
         /// The frame.
         frame: usize,
-        /// Which number.
+        /// Name of the number.
         quantity: &'static str,
-        /// In SI units.
+        /// The value in SI units.
         value: f64,
-        /// Its standard error.
+        /// Standard error of the value.
         standard_error: f64,
     },
-    /// No contact, though the frame differs from the reference the other way than a contact does.
+    /// There is no contact, but the signal has the opposite sign of a contact.
     #[error("{}", PipelineError::OppositeSignal { frame: *frame, grey: *grey })]
     OppositeSignal {
         /// The frame.
         frame: usize,
-        /// Frame minus reference where they differ most, in grey levels.
+        /// Largest difference of frame minus reference, in grey levels.
         grey: f64,
     },
-    /// The frame shows more than one contact. The largest is measured, and theory knows of one.
-    #[error("frame {}: {} beside the one measured", frame + 1, other_contacts(*others))]
+    /// The frame shows more than one contact. The largest is measured, and the theory assumes a
+    /// single contact.
+    #[error("frame {}: {} besides the one measured", frame + 1, other_contacts(*others))]
     SeveralContacts {
         /// The frame.
         frame: usize,
-        /// How many beside the largest.
+        /// Number of contacts besides the largest.
         others: usize,
     },
     /// The light has changed since the reference was taken.
@@ -111,17 +112,17 @@ pub enum Flag {
         /// Mean of frame minus reference without contact, in grey levels.
         grey: f64,
     },
-    /// The reference is brighter or darker than that of the calibration: forces are divided by the
-    /// factor, with its error.
+    /// The reference is brighter or darker than that of the calibration. Forces are divided by the
+    /// factor, whose error is included.
     #[error(
         "the reference is {:+.1} % brighter than the calibration's, unevenly by {:.1} %: forces \
          are divided by that factor",
         100.0 * change, 100.0 * uneven
     )]
     LightChanged {
-        /// The common factor less one.
+        /// The common factor minus one.
         change: f64,
-        /// What is no common factor, relative.
+        /// Deviation from a common factor, relative.
         uneven: f64,
     },
     /// The fit of the contact's profile did not converge.
@@ -130,20 +131,20 @@ pub enum Flag {
         /// The frame.
         frame: usize,
     },
-    /// The profile of the contact's pressure is not that of a ball: the contact radius is that of
-    /// the best ball.
+    /// The pressure profile is not that of a ball: the contact radius belongs to the best-fitting
+    /// ball.
     #[error(
-        "frame {}: the pressure is not that of a ball, by {:.1} % of its peak",
+        "frame {}: the pressure deviates from that of a ball by {:.1} % of its peak",
         frame + 1, 100.0 * misfit
     )]
     NotABall {
         /// The frame.
         frame: usize,
-        /// Misfit as a share of the peak.
+        /// Misfit as a fraction of the peak.
         misfit: f64,
     },
-    /// The object is said to be a punch, which touches with its whole face, but the contact has
-    /// another radius.
+    /// The object is a punch, which touches with its whole face, but the contact has another
+    /// radius.
     #[error(
         "frame {}: the contact's radius is {:.3} mm, that of the punch {:.3} mm",
         frame + 1, 1e3 * radius_m, 1e3 * punch_m
@@ -153,15 +154,15 @@ pub enum Flag {
         frame: usize,
         /// Contact radius in metres.
         radius_m: f64,
-        /// That of the punch.
+        /// Radius of the punch.
         punch_m: f64,
     },
-    /// The mean stress is one that no gel bears, or that no gel shows: a slip of a unit in the
-    /// forces, the light or the size of a pixel.
+    /// No gel can withstand the mean stress, or none would show it. The unit of the forces, the
+    /// light or the pixel size is probably wrong.
     #[error(
-        "frame {}: a mean stress of {mean_stress_pa:.1e} Pa is one that no gel {}: are the forces \
-         in newtons, the pixels in the unit asked for?",
-        frame + 1, if *mean_stress_pa > 1.0e3 { "bears" } else { "shows" }
+        "frame {}: a mean stress of {mean_stress_pa:.1e} Pa is {}: are the forces in newtons \
+         and the pixel sizes in the stated unit?",
+        frame + 1, if *mean_stress_pa > 1.0e3 { "more than any gel withstands" } else { "less than any gel shows" }
     )]
     UnlikelyStress {
         /// The frame.
@@ -169,27 +170,27 @@ pub enum Flag {
         /// Mean stress in pascals.
         mean_stress_pa: f64,
     },
-    /// The contact's outline is not round: the pixels are not as stated, the lens distorts, or the
-    /// object is no ball.
-    #[error("frame {}: the contact is longer than wide by {:.1} %", frame + 1, 100.0 * elongation)]
+    /// The outline of the contact is not round: the pixel sizes are misstated, the lens distorts,
+    /// or the object is not a ball.
+    #[error("frame {}: the contact is {:.1} % longer than wide", frame + 1, 100.0 * elongation)]
     NotRound {
         /// The frame.
         frame: usize,
-        /// Longer over shorter half axis, less one.
+        /// Longer over shorter half axis, minus one.
         elongation: f64,
     },
-    /// The pairs of the calibration do not lie on a line: light is not proportional to pressure, so
-    /// that the light's profile and its radius are not those of the pressure. A sensor calibrated
-    /// from frames has the local curve.
+    /// The calibration pairs are not on a line: light is not proportional to pressure, so profile
+    /// and radius of the light differ from those of the pressure. A sensor calibrated from frames
+    /// has the local curve and avoids this.
     #[error(
-        "frame {}: the calibration's pairs depart from a line by {:.1} % of the full scale: light \
+        "frame {}: the calibration's pairs deviate from a line by {:.1} % of the full scale: light \
          is not proportional to pressure",
         frame + 1, 100.0 * departure
     )]
     LightNotProportional {
         /// The frame.
         frame: usize,
-        /// Departure of the pairs from a line at half scale, as a share of the full scale.
+        /// Deviation of the pairs from a line at half scale, as a fraction of the full scale.
         departure: f64,
     },
     /// The calibration and the gauge disagree by more than three standard errors and two per cent.
@@ -199,56 +200,56 @@ pub enum Flag {
     GaugeDisagrees {
         /// The frame.
         frame: usize,
-        /// What the calibration says, in newtons.
+        /// Force by the calibration, in newtons.
         measured_n: f64,
-        /// What the gauge said, in newtons.
+        /// Force by the gauge, in newtons.
         gauge_n: f64,
     },
-    /// The pressure rises to the outline of a flat face, as where it sticks: it does not spread
-    /// freely, and its strain is not that of its material.
+    /// The pressure rises towards the outline of a flat face, as it does if the face sticks. The
+    /// face then does not spread freely, and its strain is not that of its material.
     #[error(
-        "frame {}: the pressure rises towards the outline ({edge_ratio:.2} of that further \
-         inside): the face sticks, its strain is not that of its material",
+        "frame {}: the pressure rises towards the outline (to {edge_ratio:.2} times that further \
+         inside): the face sticks, and its strain is not that of its material",
         frame + 1
     )]
     FaceSticks {
         /// The frame.
         frame: usize,
-        /// Light just inside the outline over that further inside.
+        /// Light just inside the outline, relative to the light further inside.
         edge_ratio: f64,
     },
-    /// A face is squeezed so far that the modulus depends on the law between stress and strain.
+    /// The compression is so large that the modulus depends on the stress–strain law.
     #[error(
-        "at a strain of {:.1} % the modulus depends on the law of the material: of a rubber-like \
+        "at a strain of {:.1} % the modulus depends on the law of the material: for a rubber-like \
          sample it is {:.0} % off (strain = \"hencky\" is closest)",
         100.0 * strain, 100.0 * excess
     )]
     MaterialLaw {
-        /// The largest strain e_zz, of the pipeline's measure.
+        /// The largest strain e_zz, in the measure of the pipeline.
         strain: f64,
-        /// By how much stress over strain there exceeds the modulus of a neo-Hookean sample.
+        /// Relative excess of stress over strain over the modulus of a neo-Hookean sample.
         excess: f64,
     },
-    /// No stress is conjugate to the strain measure, so that the sample's law at large strain was
-    /// not judged.
+    /// No stress is conjugate to the strain measure, so the law of the sample at large strain could
+    /// not be assessed.
     #[error(
         "strain {strain:.3}: no stress is conjugate to the strain measure, the material's law at \
-         this strain was not judged"
+         this strain was not assessed"
     )]
     MaterialLawNotJudged {
-        /// The largest strain e_zz, of the pipeline's measure.
+        /// The largest strain e_zz, in the measure of the pipeline.
         strain: f64,
     },
-    /// The sample relaxes: the modulus is a mean over the time of the frames.
+    /// The sample relaxes: the modulus is a mean over the times of the frames.
     #[error(
-        "the sample relaxes from {:.1} to {:.1} kPa with {time_constant_s:.2} s: the modulus is a \
+        "the sample relaxes from {:.1} to {:.1} kPa with a time constant of {time_constant_s:.2} s: the modulus is a \
          mean over the time of the frames",
         1e-3 * instantaneous_pa, 1e-3 * equilibrium_pa
     )]
     SampleRelaxes {
-        /// Modulus of a load too fast to relax, in pascals.
+        /// Modulus for a load too fast to relax, in pascals.
         instantaneous_pa: f64,
-        /// Modulus of a load held for ever.
+        /// Modulus for a load held indefinitely.
         equilibrium_pa: f64,
         /// Time constant under a held approach, in seconds.
         time_constant_s: f64,
@@ -259,10 +260,11 @@ pub enum Flag {
         /// Relative change over the frames.
         change: f64,
     },
-    /// The modulus changes with time, and it cannot be told whether it is the sample or the sensor.
+    /// The modulus changes with time, either because the sample relaxes or because the sensor
+    /// drifts.
     #[error(
-        "the modulus changes by {:+.1} % over the frames: a relaxing sample or a drifting sensor, \
-         which the frames do not tell apart",
+        "the modulus changes by {:+.1} % over the frames: the sample relaxes or the sensor drifts, \
+         which these frames cannot distinguish",
         100.0 * change
     )]
     ChangesWithTime {
@@ -277,29 +279,29 @@ pub enum Flag {
         "{points} control {} no partner", if *points == 1 { "point has" } else { "points have" }
     )]
     Unmatched {
-        /// How many.
+        /// Number of points.
         points: usize,
     },
-    /// The first contact is so small, in pixels, that its surface and the strain counted from it
-    /// may be off by more than their errors say.
+    /// The first contact is so small, in pixels, that the errors of its surface and of the strain
+    /// counted from it may be underestimated.
     #[error(
-        "the contact has a radius of {radius_px:.1} pixels: too few for the strain's error to be \
-         sure"
+        "the contact has a radius of {radius_px:.1} pixels: too few for a reliable error of the \
+         strain"
     )]
     CoarseStrain {
         /// Radius of the smaller contact in pixels.
         radius_px: f64,
     },
-    /// The warp folds over at some control points. They are left out of the strain.
-    #[error("the warp folds over at {points} control point{}", if *points == 1 { "" } else { "s" })]
+    /// The warp folds at some control points, which are excluded from the strain.
+    #[error("the warp folds at {points} control point{}", if *points == 1 { "" } else { "s" })]
     Folded {
-        /// How many.
+        /// Number of points.
         points: usize,
     },
-    /// An assumption of the estimator is broken.
+    /// An assumption of the estimator is violated.
     #[error("{warning}")]
     Assumption {
-        /// Which.
+        /// The estimator's warning.
         #[cfg_attr(
             feature = "serde",
             serde(serialize_with = "super::text::outcome::text")
@@ -308,12 +310,12 @@ pub enum Flag {
     },
 }
 
-/// Mean stresses of contacts that can be: silicone rubbers tear at some megapascals, and one grey
-/// level of a sensor of the softest gel is some ten pascals.
+/// Plausible mean stresses of contacts: silicone rubbers tear at several megapascals, and one grey
+/// level of a sensor with the softest gel is several tens of pascals.
 const GEL_STRESS_PA: [f64; 2] = [20.0, 2e6];
 
 impl ContactReading {
-    /// The cautions about this reading, as one of frame number `frame` (from 0).
+    /// The cautions about this reading, with `frame` (from 0) as the frame number.
     pub fn flags(&self, frame: usize) -> impl Iterator<Item = Flag> {
         let (share, others) = (self.saturated_share, self.other_contacts);
         let numbers = [
@@ -359,7 +361,7 @@ impl ContactReading {
     }
 }
 
-/// A force in newtons, a length in millimetres.
+/// Formats a force in newtons or a length in millimetres.
 fn in_unit(quantity: &str, value: f64) -> String {
     match quantity {
         "force" => format!("{value:.1e} N"),
@@ -367,7 +369,7 @@ fn in_unit(quantity: &str, value: f64) -> String {
     }
 }
 
-/// The contacts beside the largest.
+/// Describes the contacts besides the largest.
 fn other_contacts(others: usize) -> String {
     match others {
         1 => "another contact".to_owned(),

@@ -1,4 +1,4 @@
-//! Contacts that let light out: brightness is force.
+//! Contacts that let light leak: brightness measures force.
 use super::contact::{ContactReading, ContactStage, FrameContact, resize};
 use super::error::PipelineError;
 use crate::force::{
@@ -9,8 +9,8 @@ use nalgebra::{Matrix3, Vector3};
 use ndarray::ArrayView2;
 use std::sync::Arc;
 
-/// Light that leaks where an object presses: brightness is force, through a calibration, or the
-/// force is a gauge's.
+/// Light that leaks where an object presses. A calibration converts brightness into force, or a
+/// gauge gives the force.
 ///
 /// ```
 /// use tactile_imaging::force::{
@@ -25,7 +25,7 @@ use std::sync::Arc;
 /// };
 /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
 /// let line = LightContact::from_pairs(&pairs, [50e-6; 2])?;
-/// // The same, with the contact's radius read off its mask instead of fitted.
+/// // The same stage, with the contact radius from the mask instead of a fit.
 /// let calibration = LinearCalibration::fit(&pairs, &CalibrationOptions::default())?;
 /// let options = ForceOptions::default().without_profile();
 /// let quick = LightContact::new(calibration, [50e-6; 2], &options)?;
@@ -38,8 +38,8 @@ use std::sync::Arc;
 ///     press.add_gauged_frame(frame.view(), Some(Estimate::new(1.005, 2e-3)));
 ///     moduli.push(press.modulus()?.youngs_modulus_pa);
 /// }
-/// // A radius read off the mask is uncertain by half a pixel in twenty: E, which goes as a⁻³, by 8
-/// // %.
+/// // A radius from the mask has an error of half a pixel in twenty. E is proportional to a⁻³, so
+/// // its error is 8 %.
 /// assert!(moduli.iter().all(|e| (e / moduli[0] - 1.0).abs() < 0.08));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -51,7 +51,7 @@ pub struct LightContact {
     pixel_size_m: [f64; 2],
     polarity: Polarity,
     lens: Option<LensGeometry>,
-    /// Of the pairs that a line was fitted to.
+    /// Bend of the pairs to which a line was fitted.
     calibration_bend: Option<f64>,
 }
 
@@ -73,7 +73,7 @@ impl LightContact {
         Self::from_pairs_with(pairs, pixel_size_m, &ForceOptions::default())
     }
 
-    /// [`from_pairs`](Self::from_pairs) with options of the contact.
+    /// Like [`from_pairs`](Self::from_pairs), with options of the contact.
     ///
     /// # Errors
     /// [`PipelineError::Calibration`] and [`PipelineError::Sensor`].
@@ -90,7 +90,7 @@ impl LightContact {
         })
     }
 
-    /// With any calibration and options.
+    /// Creates the stage with any calibration and options.
     ///
     /// # Errors
     /// [`PipelineError::Sensor`].
@@ -111,8 +111,8 @@ impl LightContact {
         })
     }
 
-    /// Behind a lens that distorts: contours and coordinates are undistorted, areas are those that
-    /// the pixels cover.
+    /// Adds a distorting lens: contours and coordinates are undistorted, and areas are those
+    /// covered by the pixels.
     ///
     /// ```
     /// use tactile_imaging::force::LensGeometry;
@@ -135,13 +135,14 @@ impl LightContact {
         self
     }
 
-    /// Without a calibration: the contact from the light, its force from the gauge
+    /// Creates a stage without a calibration: the contact comes from the light, its force from the
+    /// gauge
     /// ([`Press::add_gauged_frame`](crate::pipeline::Press::add_gauged_frame)).
     ///
     /// # Errors
     /// [`PipelineError::Sensor`].
     pub fn gauged(pixel_size_m: [f64; 2], options: &ForceOptions) -> Result<Self, PipelineError> {
-        // Contact, radius and centroid do not depend on the calibration: any line serves.
+        // Contact, radius and centroid do not depend on the calibration, so any line will do.
         let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(n, n));
         let any = LinearCalibration::fit(&pairs, &CalibrationOptions::default())
             .map_err(PipelineError::Calibration)?;
@@ -230,15 +231,16 @@ impl ContactStage for LightContact {
     }
 }
 
-/// Departure of a parabola through the pairs from its chord at half scale, as a share of the full
-/// scale. `None` where it is small or does not stand out of the pairs' scatter. With light ∝ pᵉ
-/// under a ball of growing load the sum goes as F^((2+e)/3), a line for e = 1 alone. O(pairs).
+/// Deviation of a parabola through the pairs from its chord at half scale, as a fraction of the
+/// full scale. `None` if it is small or not significant within the scatter of the pairs. With light
+/// ∝ pᵉ under a ball of growing load, the sum is proportional to F^((2+e)/3), which is a line only
+/// for e = 1. O(pairs).
 fn bend_of(pairs: &[CalibrationPair]) -> Option<f64> {
     let scale = |value: fn(&CalibrationPair) -> f64| {
         pairs.iter().map(value).map(f64::abs).fold(0.0, f64::max)
     };
     let (sum, force) = (scale(|p| p.integrated_pixel_value), scale(|p| p.force_n));
-    // Fewest pairs: three parameters and as many degrees of freedom.
+    // Minimum number of pairs: three parameters and three degrees of freedom.
     if pairs.len() < 6 || !(sum > 0.0 && force > 0.0) {
         return None;
     }
@@ -258,10 +260,10 @@ fn bend_of(pairs: &[CalibrationPair]) -> Option<f64> {
         .map(|(row, force)| (force - row.dot(&parabola)).powi(2))
         .sum();
     let error = (squares / (pairs.len() - 3) as f64 * inverse[(2, 2)]).sqrt();
-    // c v² less its chord c v is −c/4 at one half.
+    // c v² minus its chord c v is −c/4 at one half.
     let departure = 0.25 * parabola[2].abs();
-    // Light ∝ p^0.95 or p^1.05 under a ball departs by 0.6 %, and changes the modulus by some 5 %.
-    // Five standard errors stand out of the scatter.
+    // Light ∝ p^0.95 or p^1.05 under a ball deviates by 0.6 % and changes the modulus by about 5 %.
+    // Five standard errors are significant.
     (departure > 6e-3 && departure > 5.0 * 0.25 * error).then_some(departure)
 }
 
@@ -269,8 +271,8 @@ fn bend_of(pairs: &[CalibrationPair]) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// Pairs of light ∝ pᵉ under a ball, forces off by a share of the full scale to either side in
-    /// turn.
+    /// Pairs with light ∝ pᵉ under a ball. The forces alternate by a fraction of the full scale to
+    /// either side.
     fn pairs(exponent: f64, error: f64) -> Vec<CalibrationPair> {
         let pair = |k: i32| {
             let force = f64::from(k) / 12.0;
@@ -286,7 +288,7 @@ mod tests {
         for exponent in [0.8, 0.9, 1.1, 1.2] {
             assert!(bend_of(&pairs(exponent, 1e-3)).is_some(), "p^{exponent}");
         }
-        // Hidden in the scatter, and three pairs.
+        // The bend is hidden in the scatter; the second case has only three pairs.
         assert_eq!(bend_of(&pairs(1.1, 0.02)), None);
         assert_eq!(bend_of(&pairs(1.2, 0.0)[..3]), None);
     }

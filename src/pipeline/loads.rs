@@ -1,24 +1,24 @@
-//! From contacts to the loads that estimators take.
+//! Converts contacts to the loads that estimators use.
 use super::contact::ContactReading;
 use crate::core::{Source, Uncertain};
 use crate::elasticity::modulus::{Bodies, Estimate, LoadSeries, LoadState};
 use std::sync::Arc;
 
-/// A contact as a load.
+/// A contact, converted to a load.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Load {
     pub contact: ContactReading,
-    /// The force of `contact`, which is known.
+    /// The force of `contact`, which must be known.
     pub force_n: Uncertain,
     /// Strain since the first load.
     pub mean_strain: Option<Estimate>,
-    /// Whether estimators use the contact. Not of one that repeats an earlier one (what is counted
-    /// twice is not better known), nor of one that is not whole.
+    /// Whether estimators use the contact. They skip one that repeats an earlier contact (counting
+    /// it twice adds no information) and one that is incomplete.
     pub counts: bool,
 }
 
 impl Load {
-    /// The load of a contact. `None` where its force is not known.
+    /// The load of a contact. `None` if its force is unknown.
     pub(super) fn of(contact: &ContactReading) -> Option<Self> {
         Some(Self {
             contact: *contact,
@@ -28,10 +28,11 @@ impl Load {
         })
     }
 
-    /// The area of a face with a floor of its error that no outline goes below: a hundredth of a
-    /// pixel all around it, by which speckles at the rim, blur and rounding shift the outline from
-    /// one load to the next. Without it 88 % of the 95 % intervals hold, with it 97 % (`SCENES=400
-    /// cargo test --release --test suite moduli_of_blocks -- --nocapture`).
+    /// The area of a face, with a lower limit for its error that no outline reaches: a hundredth of
+    /// a pixel all around it. Speckles at the rim, blur and rounding shift the outline from one
+    /// load to the next by this amount. Without the limit the coverage of the 95 % intervals is 88
+    /// %, with it 97 % (`SCENES=400 cargo test --release --test suite moduli_of_blocks --
+    /// --nocapture`).
     fn face_m2(&self, pixel_m: f64) -> Option<Estimate> {
         let area = self.contact.face?.area_m2;
         let outline_m = 2.0 * (std::f64::consts::PI * area.value).sqrt();
@@ -43,8 +44,8 @@ impl Load {
         let mut load = LoadState::new(forces.of(self.force_n));
         if self.counts {
             let radius = radii.of(self.contact.contact_radius_m);
-            // What is common to lengths is common to areas twice. Tables of depths come from balls
-            // that the same pixels measured.
+            // The errors common to lengths count twice for areas. Depths have them once: depth
+            // tables come from balls measured with the same pixels.
             let length = radius.without(Source::Noise) * radius.value.recip();
             let depth = self.contact.indentation_m.map(Uncertain::from);
             let area = self.face_m2(pixel_m).map(Uncertain::from);
@@ -57,9 +58,10 @@ impl Load {
     }
 }
 
-/// The part of each source's relative error that loads have in common: the smallest of all (a
-/// calibration's slope, the size of a pixel). What exceeds it in a load (a calibration's offset) is
-/// the load's own: counted as common, a mean over loads would extrapolate it away.
+/// The part of each source's relative error that all loads have in common: the smallest value (such
+/// as a calibration's slope, or the pixel size). The excess in a load (such as a calibration's
+/// offset) belongs to that load. If it were treated as common, a mean over loads would extrapolate
+/// it away.
 struct InCommon([f64; Source::ALL.len()]);
 
 impl InCommon {
@@ -97,11 +99,11 @@ pub(super) fn series(
     LoadSeries::new(states.collect::<Vec<_>>()).with_bodies(bodies)
 }
 
-/// Loads that a session keeps apart. More are merged.
+/// Number of loads that a session keeps separate. Further loads are merged.
 pub(super) const MOST_LOADS: usize = 32;
 
-/// The loads of a stream in rising order of force, at most [`MOST_LOADS`]: similar ones are merged.
-/// Beside each load the number of its frames.
+/// The loads of a stream in ascending order of force, each with its number of frames. At most
+/// [`MOST_LOADS`] are kept, and similar loads are merged.
 #[derive(Clone, Debug)]
 pub(super) struct SeenLoads(Vec<(Load, f64)>);
 
@@ -118,17 +120,17 @@ impl SeenLoads {
         self.0.iter().map(|(load, _)| *load)
     }
 
-    /// Takes a contact that can be trusted: alone, whole, unsaturated, inside the calibration, its
-    /// profile fitted.
+    /// Adds a reliable contact: single, complete, unsaturated, within the calibration, and with a
+    /// fitted profile.
     pub(super) fn learn(&mut self, contact: &ContactReading, mean_strain: Option<Estimate>) {
         let whole = !contact.touches_edge && contact.other_contacts == 0;
-        // A flat face is not read by the fit of a profile.
+        // A flat face is measured without a fit of the profile.
         let read = contact.converged || contact.face.is_some();
         let trusted = whole && !contact.out_of_calibration && read;
         let trusted = trusted && contact.saturated_share == 0.0;
         let load = Load::of(contact).filter(|load| trusted && load.force_n.value > 0.0);
         let Some(load) = load else { return };
-        // Noise moves two frames of one load apart: equal contacts are the same image again.
+        // Noise separates two frames of one load, so equal contacts come from the same image.
         if self
             .0
             .iter()
@@ -153,7 +155,7 @@ impl SeenLoads {
         }
     }
 
-    /// The neighbours that are closest by ratio become one.
+    /// Merges the neighbours with the smallest ratio of forces.
     fn merge_closest(&mut self) {
         let force = |i: usize| self.0[i].0.force_n.value;
         let gap = |i: usize| force(i + 1) / force(i);
@@ -165,8 +167,8 @@ impl SeenLoads {
     }
 }
 
-/// The mean of two loads, weighted with their frames: noise is averaged away, errors that both have
-/// in common are not. Radii are averaged as cubes, which grow in proportion to the force.
+/// The mean of two loads, weighted by their frames. This averages noise, but not the common errors.
+/// Radii are averaged as cubes, which are proportional to the force.
 fn merged((one, frames): (Load, f64), (other, more): (Load, f64)) -> (Load, f64) {
     let all = frames + more;
     let mean = |one: Uncertain, other: Uncertain| one * (frames / all) + other * (more / all);

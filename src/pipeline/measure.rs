@@ -1,4 +1,4 @@
-//! All answers of a press in one go, with cautions.
+//! All results of a press in one call, with cautions.
 use super::budget::error_budget;
 use super::error::PipelineError;
 use super::flag::Flag;
@@ -14,26 +14,26 @@ use crate::elasticity::relaxation::TimeDependence;
 use crate::matching::StopReason;
 use nalgebra::Matrix3;
 
-/// Presses of up to this many frames have the surface of each, for plots. Each surface takes some
-/// 30 kB and a millisecond.
+/// Presses of up to this number of frames get a surface per frame, for plots. Each surface takes
+/// about 30 kB and a millisecond.
 const PLOTTED_FRAMES: usize = 64;
 
-/// Error of the height of a surface from shading, in cells of its grid. This and the next are
-/// chosen on balls by finite elements of 6 to 150 pixels: smaller ones leave out more of them
-/// (`SEEDS=6 cargo test --test suite heights -- --nocapture`).
+/// Error of the height of a surface from shading, in cells of its grid. This and the next constant
+/// were chosen on balls of 6 to 150 pixels, computed with finite elements: smaller values miss more
+/// of them (`SEEDS=6 cargo test --test suite heights -- --nocapture`).
 const CELL_ERROR: f64 = 0.3;
 
-/// Relative error beside it of a contact of [`RIM_RADIUS_PX`] pixels. It falls with the cube of the
-/// pixels.
+/// Additional relative error for a contact of [`RIM_RADIUS_PX`] pixels. It decreases with the cube
+/// of the number of pixels.
 const RIM_ERROR: f64 = 0.15;
 const RIM_RADIUS_PX: f64 = 20.0;
 
-/// Heights of the smallest contacts are off by no more.
+/// Upper limit of this error for the smallest contacts.
 const LARGEST_RIM_ERROR: f64 = 0.4;
 
 impl Press<'_> {
-    /// Runs all stages on all frames. A stage that fails withholds nothing of the others: its error
-    /// stands in its place.
+    /// Runs all stages on all frames. If a stage fails, its error takes the place of its result,
+    /// and the other stages are not affected.
     ///
     /// ```
     /// use tactile_simulate::Trial;
@@ -46,7 +46,7 @@ impl Press<'_> {
     ///     (height.value / trial.simulation.truth[0].contact.apparent_height_m(0.0) - 1.0).abs()
     ///         < 0.1
     /// );
-    /// // At 0.7 N the ball is in contact beyond its own radius: Hertz holds for a/R up to 0.3.
+    /// // At 0.7 N the contact is larger than the ball's radius; Hertz holds for a/R up to 0.3.
     /// assert!(
     ///     measurement
     ///         .flags
@@ -94,7 +94,7 @@ impl Press<'_> {
         }
     }
 
-    /// The reference is not lit as that of the calibration was.
+    /// A caution if the light of the reference differs from that of the calibration.
     fn light_changed(&self) -> Option<Flag> {
         let light = self.stages.light.filter(|light| light.seen)?;
         Some(Flag::LightChanged {
@@ -103,7 +103,7 @@ impl Press<'_> {
         })
     }
 
-    /// A caution where a flat face is squeezed so far that the law of its material matters.
+    /// A caution if a flat face is compressed so far that the law of its material matters.
     fn material_law(&self) -> Option<Flag> {
         let Specimen::Flat(_) = self.stages.specimen else {
             return None;
@@ -114,7 +114,7 @@ impl Press<'_> {
             .map(|e| e.value)
             .max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
         let measure = self.pipeline().strain();
-        // Loads count a squeeze as positive.
+        // Loads count compression as positive.
         material_law(measure, -largest.abs())
     }
 
@@ -126,7 +126,7 @@ impl Press<'_> {
         let reading = self.reading(frame)?;
         let gauge_force_n = self.gauge(frame).map(|gauge| gauge.value);
         let cautions = self.cautions(frame)?;
-        // The light is one for all frames: the caution about it stands once.
+        // All frames have the same light, so its caution is given once.
         let of_frame = |flag: &Flag| !matches!(flag, Flag::LightDrifted { .. });
         flags.extend(cautions.into_iter().filter(of_frame));
         let radius = self.pipeline().settings().object.sphere_radius_m();
@@ -148,13 +148,13 @@ impl Press<'_> {
         })
     }
 
-    /// Whether surfaces are the pressure, read as shading.
+    /// Whether surfaces are apparent: the pressure interpreted as shading.
     fn apparent(&self) -> bool {
         self.pipeline().settings().surface_input == SurfaceInput::Shading
     }
 
-    /// Frames whose surface [`measure`](Self::measure) reconstructs: each of a press of up to 64
-    /// frames, which plots show, and the first and the last of more.
+    /// Frames whose surface [`measure`](Self::measure) reconstructs: every frame of a press of up
+    /// to 64 frames, for plots; otherwise the first and the last.
     ///
     /// ```
     /// # use tactile_imaging::{Object, Pipeline, force::CalibrationPair};
@@ -180,9 +180,8 @@ impl Press<'_> {
         (0..frames).step_by(step.max(1))
     }
 
-    /// The height of a frame's surface. Of a press with many frames only the first, the last and
-    /// those whose strain is worked out have one: each takes some milliseconds and some hundred
-    /// kilobytes.
+    /// The height of a frame's surface. In a press of many frames only the first, the last and
+    /// those with a strain have one: each takes several milliseconds and several hundred kilobytes.
     fn surface_height(&self, frame: usize) -> Result<Estimate, PipelineError> {
         let frames = self.frames();
         let wanted = self.measured_surfaces().any(|other| other == frame);
@@ -198,7 +197,8 @@ impl Press<'_> {
         if !self.apparent() {
             return Ok(Estimate::new(height, cell_m));
         }
-        // A small contact, of which smoothing leaves little but the rim, is read too high.
+        // For a small contact, smoothing leaves little more than the rim, and the height is
+        // overestimated.
         let radius_px = self.radius_px(frame).unwrap_or(RIM_RADIUS_PX);
         let of_rim = RIM_ERROR * (RIM_RADIUS_PX / radius_px).powi(3);
         let of_rim = of_rim.min(LARGEST_RIM_ERROR);
@@ -206,7 +206,7 @@ impl Press<'_> {
         Ok(Estimate::new(height, error_m))
     }
 
-    /// The last frame, if there are two.
+    /// The last frame. There must be at least two.
     fn last(&self) -> Result<usize, PipelineError> {
         match self.frames() {
             found @ 0..2 => Err(PipelineError::TooFewFrames { found }),
@@ -260,9 +260,9 @@ impl Press<'_> {
             .into_iter()
             .flatten()
             .fold(f64::INFINITY, f64::min);
-        // Of smaller contacts the strain's stated error has been seen to be too small: over 40
-        // presses the largest deviation is 3.05 of e_zz's standard errors at 38 pixels and 2.1 at
-        // 51 (`STRAIN_SEEDS=40 cargo test --test suite strain_of_sizes -- --nocapture`).
+        // For smaller contacts the stated error of the strain was found too small: over 40 presses
+        // the largest deviation is 3.05 standard errors of e_zz at 38 pixels and 2.1 at 51
+        // (`STRAIN_SEEDS=40 cargo test --test suite strain_of_sizes -- --nocapture`).
         if radius_px < 40.0 {
             flags.push(Flag::CoarseStrain { radius_px });
         }
@@ -282,15 +282,14 @@ impl Press<'_> {
         })
     }
 
-    /// Whether the modulus changes over the frames that have a [time](Self::set_time_s): relaxing
-    /// sample or drifting sensor, see
-    /// [`relaxation`](crate::elasticity::relaxation). Where all of them have a gauge's force, that
-    /// is taken in place of the light's: no gain is in it. `None` where fewer than two frames
-    /// have a time and a modulus of their own.
+    /// Whether the modulus changes over the frames that have a [time](Self::set_time_s), because
+    /// the sample relaxes or the sensor drifts, see [`relaxation`](crate::elasticity::relaxation).
+    /// If all of them have a gauge reading, the gauge's force is used, which does not depend on the
+    /// sensor's gain. `None` if fewer than two frames have a time and a modulus of their own.
     ///
     /// # Errors
-    /// Those of [`modulus`](Self::modulus) but for its estimator's: what gives no modulus is left
-    /// out.
+    /// Those of [`modulus`](Self::modulus), except those of its estimator: frames without a modulus
+    /// are skipped.
     fn time_dependence(&self) -> Result<Option<TimeResult>, PipelineError> {
         let times_s: Vec<_> = (0..self.frames()).map(|k| self.time_s(k)).collect();
         if times_s.iter().flatten().count() < 2 {
@@ -298,8 +297,8 @@ impl Press<'_> {
         }
         let estimator = self.pipeline().estimator()?;
         let flat = matches!(self.stages.specimen, Specimen::Flat(_));
-        // A strain since the first frame gives no modulus of one load; that of a face is since the
-        // unloaded state.
+        // The strain since the first frame gives no modulus for a single load. The strain of a face
+        // is counted from the unloaded state.
         if estimator.needs_strain() && !flat {
             return Ok(None);
         }
@@ -314,7 +313,7 @@ impl Press<'_> {
         })
     }
 
-    /// The loads with the gauge's forces, where all frames with a time have one.
+    /// The loads with the gauge's forces, if all frames with a time have one.
     fn gauged_loads(&self, series: &LoadSeries) -> Option<LoadSeries> {
         let mut loads = series.loads().to_vec();
         for (frame, load) in loads.iter_mut().enumerate() {
@@ -327,7 +326,8 @@ impl Press<'_> {
         Some(series.with_loads(loads))
     }
 
-    /// How the light's force changed against the gauge's, where all frames with a time have both.
+    /// Relative change of the light's force compared with the gauge, if all frames with a time have
+    /// both.
     fn gain_change(&self) -> Option<f64> {
         let mut forces = Vec::new();
         for frame in 0..self.frames() {
@@ -338,7 +338,7 @@ impl Press<'_> {
             let reading = self.reading(frame).ok()?;
             let force = reading.force_n?;
             let light = Estimate::new(force.value, force.part(Source::Noise).abs());
-            // Without a calibration the reading is the gauge's.
+            // Without a calibration the reading comes from the gauge.
             let is_gauge = light.value == gauge.value;
             if !is_gauge {
                 forces.push((time_s, light, gauge));
@@ -348,8 +348,8 @@ impl Press<'_> {
         (result.change != TimeDependence::Steady).then(|| result.relative_change())
     }
 
-    /// Cautions about time: a modulus that is of a moment, a gain that is no longer the
-    /// calibration's.
+    /// Cautions about time: a modulus that applies to one moment only, or a gain that has changed
+    /// since the calibration.
     fn time_flags(&self, time: Option<&TimeResult>) -> Vec<Flag> {
         let gain = self
             .gain_change()

@@ -1,32 +1,32 @@
-//! The pipeline: frames in. Force, contact, surface, match, strain and modulus out, each when asked
-//! for.
+//! The pipeline: from frames to force, contact, surface, match, strain and modulus, each computed
+//! on request.
 //!
 //! ```text
 //! frame ─ contact ─┬─ force, radius, centroid ──────────────────────────┐
 //!                  └─ surface ─ control points ─ match ─ warp ─ strain ─┴─ modulus
 //! ```
 //!
-//! A [`Pipeline`] holds the stages, each any implementation of its trait, given as a value or by
-//! its name in a configuration ([`StagesConfig`]). It is `Send + Sync` and cheap to clone. A
-//! [`Press`] holds frames and computes what it is asked for, with what that needs and nothing else:
-//! [`Press::contact`] touches no surface, [`Press::modulus`] of a ball none either,
-//! [`Press::measure`] everything. The [`Report`] says what ran, for how long, and what was skipped
-//! for which reason.
+//! A [`Pipeline`] holds the stages. Each is any implementation of its trait, given as a value or by
+//! its name in a configuration ([`StagesConfig`]). A pipeline is `Send + Sync` and cheap to clone.
+//! A [`Press`] holds frames and computes only the requested results and their inputs:
+//! [`Press::contact`] and, for a ball, [`Press::modulus`] reconstruct no surface, whereas
+//! [`Press::measure`] computes everything. The [`Report`] lists which stages ran, their times, and
+//! what was skipped for which reason.
 //!
-//! A [`Session`] follows a stream from a [`FrameSource`] with constant memory, force and modulus
-//! and, for who asks, strain;
-//! [`contacts`] reads a batch of frames.
+//! A [`Session`] follows a stream from a [`FrameSource`] with constant memory. It computes force,
+//! modulus and, on request, strain. [`contacts`] reads a batch of frames.
 //!
 //! # Which modulus
-//! For a ball, Hertz's pressure p₀√(1 − r²/a²) read as frontal Lambertian shading is a hemisphere
-//! of radius a, and a grows as (F R/E*)^⅓. Between two loads that surface scales by (F₂/F₁)^⅓
-//! whatever the modulus is. The ratio of stress to strain, equation (31), is therefore reported
-//! (first among [`Measurement::estimators`]) but not believed: the modulus comes from a³ =
-//! 3FR/(4E*), both bodies yielding, the waveguide's layers in series. a/R is in every report, and
-//! beyond 0.3 the result carries a flag. Specimens with a flat face are what (31) is exact for:
-//! stress over strain, regressed over all loads, the strain from the growth of the face's area. An
-//! object of unknown shape is read so if its contacts are those of a flat face, and refused with
-//! what to tell the program if not ([`PipelineError::NotUniaxial`]).
+//! For a ball, Hertz's pressure p₀√(1 − r²/a²) interpreted as frontal Lambertian shading is a
+//! hemisphere of radius a, and a grows as (F R/E*)^⅓. Between two loads this surface scales by
+//! (F₂/F₁)^⅓ for any modulus. The ratio of stress to strain, equation (31), is therefore reported
+//! (first in [`Measurement::estimators`]) but not used: the modulus comes from a³ = 3FR/(4E*),
+//! where both bodies are elastic and the waveguide's layers act in series. Every report contains
+//! a/R, and above 0.3 the result has a flag. Equation (31) is exact for specimens with a flat face:
+//! stress over strain, regressed over all loads, with the strain from the growth of the face's
+//! area. An object of unknown shape is treated in this way if its contacts are those of a flat
+//! face. Otherwise it is rejected, and the error explains what to specify
+//! ([`PipelineError::NotUniaxial`]).
 mod assumptions;
 mod batch;
 mod budget;

@@ -1,4 +1,4 @@
-//! The pipeline: the stages, shared, and the settings.
+//! The pipeline: the shared stages and the settings.
 use super::contact::ContactStage;
 use super::error::PipelineError;
 use super::estimators::EstimatorStage;
@@ -17,8 +17,8 @@ use crate::tps::{AffineModel, WarpModel};
 use ndarray::ArrayView2;
 use std::sync::Arc;
 
-/// The stages from a frame to Young's modulus, each of which can be replaced in one line, and the
-/// settings they share.
+/// The stages from a frame to Young's modulus and their common settings. Each stage can be replaced
+/// in one line.
 ///
 /// | stage | setter | default |
 /// |---|---|---|
@@ -30,19 +30,19 @@ use std::sync::Arc;
 /// | displacement gradient to strain | [`with_strain`](Self::with_strain) | [`GreenLagrange`] |
 /// | loads to the modulus | [`with_estimator`](Self::with_estimator) | the layered law for a ball, else stress over strain; see [`EstimatorChoice::Best`] |
 ///
-/// A setter takes any value that implements the stage's trait, a `Box` or an `Arc` of one too, so
-/// that a program can choose at run time;
-/// [`with_stages`](Self::with_stages) takes stages by the names of a configuration. The stages are
-/// shared: a clone copies pointers and the settings.
+/// A setter accepts any value that implements the stage's trait, and also a `Box` or an `Arc` of
+/// one, so that a program can choose at run time. [`with_stages`](Self::with_stages) selects stages
+/// by name, as in a configuration. The stages are shared: a clone copies only pointers and the
+/// settings.
 ///
 /// ```
 /// use ndarray::Array2;
 /// use tactile_imaging::{Object, Pipeline, force::CalibrationPair};
-/// // 10⁵ grey levels in all are 1 N; a pixel is 50 µm wide; the ball has a radius of 3 mm.
+/// // 10⁵ grey levels in total are 1 N; a pixel is 50 µm wide; the ball has a radius of 3 mm.
 /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
 /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-/// // Hertz's pressure p₀√(1 − r²/a²), a = 20 pixels = 1 mm: (2π/3) a² p₀ grey levels, 1.005 N for
-/// // p₀ = 120.
+/// // Hertz's pressure p₀√(1 − r²/a²) with a = 20 pixels = 1 mm has (2π/3) a² p₀ grey levels in
+/// // total, which are 1.005 N for p₀ = 120.
 /// let hertz = |peak: f64| {
 ///     Array2::from_shape_fn((64, 64), |(r, c)| {
 ///         let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
@@ -52,8 +52,8 @@ use std::sync::Arc;
 /// let (reference, frame) = (hertz(0.0), hertz(120.0));
 /// let mut press = pipeline.press(reference.view())?;
 /// press.add_frame(frame.view());
-/// // Hertz has E = (1 − ν²) 3FR/(4a³) of a ball on a rigid flat; finite strain changes it by some
-/// // percents at a/R = 1/3.
+/// // For a ball on a rigid flat, Hertz's law is E = (1 − ν²) 3FR/(4a³). Finite strain changes it
+/// // by several per cent at a/R = 1/3.
 /// let hertz = 0.75 * 3.0 * 1.005 * 3e-3 / (4.0 * 1e-9);
 /// assert!((press.modulus()?.youngs_modulus_pa / hertz - 1.0).abs() < 0.1);
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
@@ -62,7 +62,7 @@ use std::sync::Arc;
 pub struct Pipeline {
     contact: Arc<dyn ContactStage>,
     surface: Arc<dyn SurfaceReconstruction<f64> + Send + Sync>,
-    /// None: the default for what the surface is read from.
+    /// `None` for the default, which depends on the source of the surface.
     sampler: Option<Arc<dyn ControlPointSampler<f64> + Send + Sync>>,
     matcher: Arc<dyn PointMatcher<3> + Send + Sync>,
     warp: Arc<dyn WarpModel<3> + Send + Sync>,
@@ -74,7 +74,8 @@ pub struct Pipeline {
 }
 
 impl Pipeline {
-    /// The default stages behind any contact stage. No waveguide, 200 control points.
+    /// Combines any contact stage with the default stages, without a waveguide and with 200 control
+    /// points.
     ///
     /// ```
     /// use tactile_imaging::elasticity::modulus::ModulusEstimator;
@@ -86,8 +87,8 @@ impl Pipeline {
     /// ```
     ///
     /// # Errors
-    /// [`PipelineError::Material`] for an object that is not physical,
-    /// [`PipelineError::SurfaceOptions`] where a default stage refuses its options.
+    /// [`PipelineError::Material`] for an unphysical object, [`PipelineError::SurfaceOptions`] if a
+    /// default stage rejects its options.
     pub fn new(
         contact: impl ContactStage + 'static,
         object: Object,
@@ -109,7 +110,7 @@ impl Pipeline {
     /// The default pipeline for a sensor calibrated with pairs of integrated pixel value and force.
     ///
     /// # Errors
-    /// [`PipelineError::Calibration`] and [`PipelineError::Sensor`]. Those of [`new`](Self::new).
+    /// [`PipelineError::Calibration`], [`PipelineError::Sensor`] and those of [`new`](Self::new).
     pub fn from_pairs(
         pairs: &[CalibrationPair],
         pixel_size_m: [f64; 2],
@@ -133,7 +134,7 @@ impl Pipeline {
         self
     }
 
-    /// Changes any of the settings. All are checked together.
+    /// Changes any of the settings and validates them together.
     ///
     /// ```
     /// use tactile_simulate::Trial;
@@ -147,7 +148,7 @@ impl Pipeline {
     /// let press = trial.press(&pipeline)?;
     /// let camera = trial.scene.options().camera;
     /// assert!((press.surface(0)?.pixel_size_m[0] / camera.pixel_size_m[0] - 2.0).abs() < 1e-12);
-    /// // E is proportional to the radius, but for the guide's share of the compliance and the
+    /// // E is proportional to the radius, apart from the guide's share of the compliance and the
     /// // correction for finite strain.
     /// let relative = |m: &tactile_imaging::elasticity::modulus::ModulusEstimate| {
     ///     m.standard_error_pa / m.youngs_modulus_pa
@@ -155,8 +156,7 @@ impl Pipeline {
     /// let of_the_radius = relative(&press.modulus()?).powi(2)
     ///     - relative(&trial.press(&exact)?.modulus()?).powi(2);
     /// assert!(of_the_radius.sqrt() > 0.03);
-    /// // On a rigid flat instead of the layered guide the ball would be softer for the same
-    /// // contact.
+    /// // On a rigid flat instead of the layered guide, the same contact would mean a softer ball.
     /// let rigid = exact.clone().with_settings(|settings| {
     ///     (settings.waveguide, settings.layer_covariance) = (None, None);
     /// })?;
@@ -175,9 +175,9 @@ impl Pipeline {
     /// ```
     ///
     /// # Errors
-    /// [`PipelineError::Material`] for an object that is not physical,
-    /// [`PipelineError::Setting`] for a setting outside its range, an error that is negative or not
-    /// finite, and a covariance that has not three rows and columns for each layer of the waveguide.
+    /// [`PipelineError::Material`] for an unphysical object, [`PipelineError::Setting`] for a
+    /// setting outside its range, an error that is negative or not finite, and a covariance without
+    /// three rows and columns for each layer of the waveguide.
     pub fn with_settings(
         mut self,
         change: impl FnOnce(&mut Settings),
@@ -192,7 +192,7 @@ impl Pipeline {
         Ok(self)
     }
 
-    /// Takes the stages that a configuration names. A surface stage looks at shading.
+    /// Uses the stages named in a configuration. The input of the surface stage is then shading.
     ///
     /// ```
     /// use tactile_simulate::Trial;
@@ -205,7 +205,7 @@ impl Pipeline {
     /// ```
     ///
     /// # Errors
-    /// [`PipelineError::SurfaceOptions`], [`PipelineError::WarpOptions`] where a stage refuses its
+    /// [`PipelineError::SurfaceOptions`] and [`PipelineError::WarpOptions`] if a stage rejects its
     /// options.
     pub fn with_stages(mut self, config: &StagesConfig) -> Result<Self, PipelineError> {
         self.surface = config.reconstruction.build()?;
@@ -218,7 +218,7 @@ impl Pipeline {
         Ok(self)
     }
 
-    /// Takes another way from frame to contact and force.
+    /// Replaces the contact stage, which converts a frame to contact and force.
     ///
     /// ```
     /// use tactile_imaging::pipeline::{DarkContact, Object, Pipeline};
@@ -252,14 +252,14 @@ impl Pipeline {
         self
     }
 
-    /// Takes another way from image to surface, looking at `input`.
+    /// Replaces the surface stage, which gets `input`.
     ///
     /// ```
     /// use tactile_simulate::Trial;
     /// let trial = Trial::coarser(8)?;
     /// use tactile_imaging::pipeline::SurfaceInput;
     /// use tactile_imaging::sfs::{BoundaryCondition, Eikonal, Lighting};
-    /// // A rim that is 0.1 mm high.
+    /// // A rim of 0.1 mm height.
     /// let raised =
     ///     Eikonal::new(Lighting::default()).with_boundary(BoundaryCondition::Height(1e-4))?;
     /// let pipeline = trial.pipeline()?.with_surface(raised, SurfaceInput::Shading);
@@ -283,10 +283,10 @@ impl Pipeline {
         self
     }
 
-    /// Takes another estimator of the modulus. Strains of the loads are counted from the first. The
-    /// loads come with the [object and the guide](crate::elasticity::modulus::LoadSeries::bodies).
-    /// An answer from contacts alone that does not count a guide that yields has the caution
-    /// [`GuideIgnored`](crate::elasticity::modulus::Warning::GuideIgnored).
+    /// Replaces the estimator of the modulus. Strains of the loads are counted from the first load.
+    /// The loads include the [object and the
+    /// guide](crate::elasticity::modulus::LoadSeries::bodies). A result from contacts on a
+    /// compliant guide that ignores the guide gets the caution
     ///
     /// ```
     /// use tactile_simulate::Trial;
@@ -296,7 +296,7 @@ impl Pipeline {
     /// let hertz = HertzSphere::new(ball.radius_m, ball.material.poisson_ratio)?;
     /// let by_name = trial.pipeline()?;
     /// let given = by_name.clone().with_estimator(hertz);
-    /// // The guide is the pipeline's, as for the estimator of that name.
+    /// // The guide comes from the pipeline, as for the estimator with that name.
     /// assert_eq!(trial.press(&given)?.modulus()?, trial.press(&by_name)?.modulus()?);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -306,7 +306,7 @@ impl Pipeline {
         self
     }
 
-    /// Takes another choice of control points.
+    /// Replaces the sampler of control points.
     ///
     /// ```
     /// use tactile_simulate::Trial;
@@ -322,7 +322,7 @@ impl Pipeline {
         self
     }
 
-    /// Takes another matcher, one of your own too, or one chosen at run time.
+    /// Replaces the matcher. It may be user-defined or chosen at run time.
     ///
     /// ```
     /// use tactile_simulate::Trial;
@@ -347,7 +347,7 @@ impl Pipeline {
         self
     }
 
-    /// Takes another measure of strain.
+    /// Replaces the strain measure.
     ///
     /// ```
     /// use tactile_simulate::Trial;
@@ -357,7 +357,7 @@ impl Pipeline {
     /// let hencky = green.clone().with_strain(Hencky);
     /// let e = trial.press(&green)?.strain(1)?.summary.mean[(2, 2)];
     /// let logarithmic = trial.press(&hencky)?.strain(1)?.summary.mean[(2, 2)];
-    /// // A stretch λ is (λ² − 1)/2 to Green and Lagrange, ln λ to Hencky.
+    /// // A stretch λ has the strain (λ² − 1)/2 by Green and Lagrange, and ln λ by Hencky.
     /// assert!(logarithmic < e && (logarithmic - 0.5 * (1.0 + 2.0 * e).ln()).abs() < 0.02);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -367,7 +367,7 @@ impl Pipeline {
         self
     }
 
-    /// Takes another family of warps for the strain.
+    /// Replaces the warp model used for the strain.
     ///
     /// ```
     /// use tactile_simulate::Trial;
@@ -395,18 +395,17 @@ impl Pipeline {
         self.contact.as_ref()
     }
 
-    /// The estimator of the modulus. One that goes by its name is built when it is first needed,
-    /// for all clones.
+    /// The estimator of the modulus. An estimator selected by name is built on first use and shared
+    /// by all clones.
     ///
     /// # Errors
-    /// [`PipelineError::WrongEstimator`] where the chosen one does not fit the object.
+    /// [`PipelineError::WrongEstimator`] if the chosen one does not fit the object.
     pub fn estimator(&self) -> Result<Arc<dyn ModulusEstimator + Send + Sync>, PipelineError> {
         let settings = &self.settings;
         self.estimator
             .get(settings.object, settings.waveguide.as_ref())
     }
 
-    /// The contact stage, to be held.
     /// The object and the guide, with their errors.
     pub(super) fn bodies(&self) -> &Arc<Bodies> {
         &self.bodies
@@ -424,7 +423,7 @@ impl Pipeline {
         match (&self.sampler, self.settings.surface_input) {
             (Some(sampler), _) => sampler.as_ref(),
             (None, SurfaceInput::Shading) => &ContactSampler,
-            // Depths read from a signal end in a step at the contact's boundary, not at the plane.
+            // Depths from a signal end in a step at the boundary of the contact, not at the plane.
             (None, SurfaceInput::Signal) => &EquallySpaced,
         }
     }
@@ -441,7 +440,7 @@ impl Pipeline {
         self.strain.as_ref()
     }
 
-    /// The reference that the settings ask for, of one or more frames without contact.
+    /// The reference according to the settings, from one or more frames without contact.
     pub(super) fn reference_frame(
         &self,
         frames: &[ArrayView2<'_, u8>],

@@ -1,4 +1,4 @@
-//! A press: frames at one or more loads, of which nothing is computed before it is asked for.
+//! A press: frames at one or more loads, whose results are computed on request.
 use super::contact::{ContactReading, FrameContact};
 use super::depression;
 use super::error::PipelineError;
@@ -20,7 +20,7 @@ use std::borrow::Cow;
 use std::collections::HashSet;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-/// Reads an image whenever a stage needs it. The error is a sentence.
+/// Reads an image when a stage needs it. The error is a message.
 type Read = Arc<dyn Fn() -> Result<Array2<u8>, String> + Send + Sync>;
 
 #[derive(Clone)]
@@ -42,16 +42,16 @@ impl FrameImage<'_> {
     }
 }
 
-/// An answer that is computed when it is first asked for.
+/// A result that is computed on first use.
 type Lazy<T> = OnceLock<Result<T, PipelineError>>;
 
-/// A frame and its answers so far.
+/// A frame with its results so far.
 struct Loaded<'a> {
     image: FrameImage<'a>,
     gauge: Option<Estimate>,
-    /// Seconds since the object touched, where they are known.
+    /// Seconds since the object touched. `None` if unknown.
     time_s: Option<f64>,
-    // Boxed, so that thousands of frames, whose strain nobody asks for, take no room for it.
+    // Boxed, so that thousands of frames without a requested strain need little memory.
     contact: Lazy<Box<KnownContact>>,
     surface: Lazy<Box<ContactSurface>>,
     points: Lazy<Box<ControlPoints>>,
@@ -76,18 +76,18 @@ impl<'a> Loaded<'a> {
 
 /// The contact of a frame.
 struct KnownContact {
-    /// Without its mask where the image is read: nothing as large as an image is kept of such a
-    /// frame.
+    /// The contact. Frames read on demand have no mask here, so that nothing of the size of an
+    /// image is kept.
     contact: FrameContact,
     /// Number of the contact's pixels.
     pixels: usize,
 }
 
-/// Frames at one or more loads. Every result is computed when it is first asked for, with what it
-/// needs and nothing else, and kept. Matches, displacements and strains are from the first frame to
-/// a later one.
+/// Frames at one or more loads. Each result is computed on first use, together with only the inputs
+/// it needs, and is then kept. Matches, displacements and strains are from the first frame to a
+/// later one.
 ///
-/// Made by [`Pipeline::press`].
+/// Created by [`Pipeline::press`].
 ///
 /// ```
 /// use tactile_simulate::Trial;
@@ -119,17 +119,16 @@ pub struct Press<'a> {
 }
 
 impl Pipeline {
-    /// Starts a press: add frames, then ask for what you want. The press holds a clone of the
-    /// pipeline.
+    /// Starts a press: add frames, then request results. The press holds a clone of the pipeline.
     ///
     /// # Errors
-    /// [`PipelineError::Sensor`] for a reference without pixels, or too dark for the flat field
-    /// that was asked for.
+    /// [`PipelineError::Sensor`] for a reference without pixels, or one that is too dark for the
+    /// requested flat field.
     pub fn press<'a>(&self, reference: ArrayView2<'_, u8>) -> Result<Press<'a>, PipelineError> {
         Ok(self.press_on(Arc::new(self.reference_frame(&[reference])?)))
     }
 
-    /// Starts a press on a reference made before: its noise is measured once for many presses.
+    /// Starts a press on an existing reference, whose noise is measured once for many presses.
     ///
     /// ```
     /// use std::sync::Arc;
@@ -156,7 +155,7 @@ impl Pipeline {
 }
 
 impl<'a> Press<'a> {
-    /// The same frames on the same reference, of which nothing is computed yet: to time it again.
+    /// The same frames and reference without any results, to time the computation again.
     #[must_use]
     pub fn renewed(&self) -> Self {
         let renewed = |frame: &Loaded<'a>| Loaded {
@@ -170,13 +169,14 @@ impl<'a> Press<'a> {
         }
     }
 
-    /// Adds a frame, a view or an array of its own. Returns its number.
+    /// Adds a frame, as a view or an owned array. Returns its number.
     pub fn add_frame(&mut self, image: impl Into<CowArray<'a, u8, Ix2>>) -> usize {
         self.add_gauged_frame(image, None)
     }
 
-    /// Adds a frame with a gauge's reading of the force in newtons (standard error 0: exact but for
-    /// [`Source::Gain`](crate::core::Source::Gain)). Returns its number.
+    /// Adds a frame with a gauge reading of the force in newtons. A standard error of 0 means that
+    /// the reading is exact except for [`Source::Gain`](crate::core::Source::Gain). Returns the
+    /// number of the frame.
     ///
     /// ```
     /// use tactile_imaging::force::Estimate;
@@ -207,9 +207,8 @@ impl<'a> Press<'a> {
         self.frames.len() - 1
     }
 
-    /// Adds a frame that is read whenever a stage needs it and never kept, for more frames than
-    /// memory takes; returns its number. An error of `read` is a sentence and becomes
-    /// [`PipelineError::Unreadable`].
+    /// Adds a frame that is read whenever a stage needs it and is never kept, for presses that do
+    /// not fit in memory. Returns its number. An error of `read` is a message and becomes
     ///
     /// ```
     /// use tactile_simulate::Trial;
@@ -217,7 +216,7 @@ impl<'a> Press<'a> {
     /// let pipeline = trial.pipeline()?;
     /// let mut press = pipeline.press(trial.simulation.reference.view())?;
     /// for frame in trial.simulation.frames {
-    ///     // In earnest: of a file.
+    ///     // A program would read the frame from a file here.
     ///     press.add_frame_on_demand(None, move || Ok(frame.clone()));
     /// }
     /// assert!(press.contact(1)?.is_some());
@@ -233,7 +232,7 @@ impl<'a> Press<'a> {
         self.frames.len() - 1
     }
 
-    /// The pipeline.
+    /// The pipeline of the press.
     pub fn pipeline(&self) -> &Pipeline {
         &self.stages.pipeline
     }
@@ -251,12 +250,12 @@ impl<'a> Press<'a> {
         self.frames.len()
     }
 
-    /// The stages that ran so far, and those that were skipped.
+    /// The stages that ran so far and those that were skipped.
     pub fn report(&self) -> Report {
         self.scratch().report.clone()
     }
 
-    /// The gauge's reading of a frame's force, if there was one.
+    /// The gauge reading of a frame's force. `None` if there is none.
     pub fn gauge(&self, frame: usize) -> Option<Estimate> {
         self.frames.get(frame)?.gauge
     }
@@ -271,7 +270,7 @@ impl<'a> Press<'a> {
         loaded.ok_or(PipelineError::NoSuchFrame { frame, frames })
     }
 
-    /// The contact of a frame with its force. `None` where nothing touches.
+    /// The contact of a frame with its force. `None` without contact.
     ///
     /// # Errors
     /// [`PipelineError::Contact`], [`PipelineError::NoSuchFrame`].
@@ -279,13 +278,14 @@ impl<'a> Press<'a> {
         Ok(self.known(frame)?.contact.reading.as_ref())
     }
 
-    /// Depths in metres to which a ball presses the guide at distances (m) from the contact's
-    /// centre: the real surface beside the apparent one of [`surface`](Self::surface). `None` where
-    /// nothing touches, the object is no ball, or the force or the guide's layers are not known.
+    /// Depths in metres to which a ball indents the guide at distances (m) from the centre of the
+    /// contact: the real surface, as opposed to the apparent one of [`surface`](Self::surface).
+    /// `None` without contact, if the object is not a ball, or if the force or the layers of the
+    /// guide are unknown.
     ///
-    /// [`depression_m`](crate::elasticity::contact::depression_m) under the force and the contact
-    /// radius of the frame. The standard error is that of force, radius, layers and of the law,
-    /// which is for small strains.
+    /// The depths are those of [`depression_m`](crate::elasticity::contact::depression_m) for the
+    /// force and contact radius of the frame. The standard error includes force, radius, layers and
+    /// the law, which assumes small strains.
     ///
     /// ```
     /// use tactile_simulate::{CalibrationRun, Camera, ContactModel, PressOptions, Trial};
@@ -297,7 +297,7 @@ impl<'a> Press<'a> {
     /// let trial = Trial::new(options, &CalibrationRun::default())?;
     /// let press = trial.press(&trial.pipeline()?)?;
     /// let depths = press.guide_depression_m(1, &[0.0, 2e-3])?.expect("a ball on layers");
-    /// // The guide yields by 2.13 mm on the axis under 1.2 N.
+    /// // The guide is indented by 2.13 mm on the axis under 1.2 N.
     /// assert!((depths[0].value - 2.134e-3).abs() < 1.96 * depths[0].standard_error);
     /// assert!(depths[1].value < depths[0].value);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -316,8 +316,8 @@ impl<'a> Press<'a> {
         Ok(contact.and_then(|contact| depression::depths(contact, bodies, distances_m)))
     }
 
-    /// The cautions about a frame's contact, or about a frame without one, which
-    /// [`measure`](Self::measure) gives for all frames.
+    /// The cautions about one frame, with or without contact. [`measure`](Self::measure) gives them
+    /// for all frames.
     ///
     /// ```
     /// use tactile_imaging::pipeline::{Flag, Object, Pipeline};
@@ -365,8 +365,8 @@ impl<'a> Press<'a> {
         Ok(contact)
     }
 
-    /// A frame's image and its contact with the mask, which is found again where the frame keeps
-    /// none.
+    /// A frame's image and its contact with the mask. If the mask was not kept, it is computed
+    /// again.
     fn masked(
         &self,
         frame: usize,
@@ -380,7 +380,7 @@ impl<'a> Press<'a> {
         Ok((image, contact))
     }
 
-    /// The contact of a frame that must have one.
+    /// The contact of a frame. A frame without contact is an error.
     pub(super) fn reading(&self, frame: usize) -> Result<ContactReading, PipelineError> {
         if let Some(reading) = self.contact(frame)? {
             return Ok(*reading);
@@ -403,7 +403,7 @@ impl<'a> Press<'a> {
     /// let surface = press.surface(0)?;
     /// let top =
     ///     surface.surface.heights.iter().copied().filter(|h| h.is_finite()).fold(0.0, f64::max);
-    /// // Hertz's pressure read as shading is a hemisphere as high as the contact's radius.
+    /// // Hertz's pressure interpreted as shading is a hemisphere of the contact's radius.
     /// let radius = trial.simulation.truth[0].contact.contact_radius_m;
     /// assert!((top / radius - 1.0).abs() < 0.1);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -415,7 +415,7 @@ impl<'a> Press<'a> {
     pub fn surface(&self, frame: usize) -> Result<&ContactSurface, PipelineError> {
         self.reading(frame)?;
         let surface = self.frames[frame].surface.get_or_init(|| {
-            // All surfaces have the grid of the first.
+            // All surfaces use the grid of the first.
             let pixels = self.known(0)?.pixels;
             let (image, contact) = self.masked(frame)?;
             let mut surface = Box::<ContactSurface>::default();
@@ -436,7 +436,7 @@ impl<'a> Press<'a> {
     /// let press = trial.press(&pipeline)?;
     /// let points = press.control_points(0)?;
     /// assert_eq!(points.len(), 60);
-    /// // All within the contact, whose middle is the frame's: (86.5, 64.5) pixels.
+    /// // All are within the contact, whose centre is that of the frame: (86.5, 64.5) pixels.
     /// let radius = 1.1 * trial.simulation.truth[0].contact.contact_radius_m;
     /// assert!(
     ///     points.iter().all(|p| (p.x - 86.5 * 172.4e-6).hypot(p.y - 64.5 * 172.4e-6) < radius)
@@ -461,7 +461,7 @@ impl<'a> Press<'a> {
         points.as_deref().map_err(Clone::clone)
     }
 
-    /// The matches of the first frame's control points to those of a later frame.
+    /// The matches of the first frame's control points with those of a later frame.
     ///
     /// ```
     /// use tactile_simulate::Trial;
@@ -488,8 +488,8 @@ impl<'a> Press<'a> {
         matching.as_deref().map_err(Clone::clone)
     }
 
-    /// The strain between the first frame and a later one. Of an object with a flat face by the
-    /// growth of its area, the same at all points.
+    /// The strain between the first frame and a later one. For an object with a flat face it
+    /// follows from the growth of the face's area and is equal at all points.
     ///
     /// # Errors
     /// [`PipelineError::TooFewMatches`], [`PipelineError::Warp`], [`PipelineError::Strain`] and
@@ -524,8 +524,8 @@ impl<'a> Press<'a> {
         strain.as_deref().map_err(Clone::clone)
     }
 
-    /// Young's modulus by the estimator of the pipeline. For a
-    /// ball that takes the contacts alone: no surface is reconstructed.
+    /// Young's modulus by the estimator of the pipeline. For a ball it needs only the contacts, and
+    /// no surface is reconstructed.
     ///
     /// # Errors
     /// [`PipelineError::Modulus`], [`PipelineError::NoForce`], and those of the stages it needs.
@@ -536,13 +536,13 @@ impl<'a> Press<'a> {
             .modulus(&mut self.scratch(), estimator.as_ref(), &loads)
     }
 
-    /// The load of every frame, with the strain since the first (of at most 32 frames, evenly
-    /// chosen. Of a flat face, of all frames and since the unloaded state) and the errors that all
-    /// share. This is the input of
-    /// [estimators](crate::elasticity::modulus::ModulusEstimator).
+    /// The load of each frame and the errors common to all loads, which is the input of
+    /// [estimators](crate::elasticity::modulus::ModulusEstimator). The strain is counted from the
+    /// first frame, for at most 32 frames at even intervals. For a flat face it is counted from the
+    /// unloaded state, for all frames.
     ///
-    /// A frame whose contact repeats an earlier one carries no information, and a contact that the
-    /// frame's edge cuts is wrong: their loads have a force alone.
+    /// A frame whose contact repeats an earlier one adds no information, and a contact cut by the
+    /// edge of the frame is wrong: their loads have only a force.
     ///
     /// ```
     /// use tactile_simulate::Trial;
@@ -561,7 +561,7 @@ impl<'a> Press<'a> {
         self.loads(true)
     }
 
-    /// Young's modulus by every estimator that the frames allow, the paper's ratio first.
+    /// Young's modulus by every estimator that the frames permit, the paper's ratio first.
     ///
     /// ```
     /// use tactile_simulate::Trial;
@@ -577,7 +577,7 @@ impl<'a> Press<'a> {
     /// ```
     ///
     /// # Errors
-    /// Those of the contacts. What an estimator cannot do is left out.
+    /// Those of the contacts. Estimators that fail are left out.
     pub fn estimates(&self) -> Result<Vec<ModulusEstimate>, PipelineError> {
         let loads = match self.loads(true) {
             Ok(loads) => loads,
@@ -599,7 +599,7 @@ impl<'a> Press<'a> {
         Ok(estimates.collect())
     }
 
-    /// The load of every frame, and the relative errors that all share.
+    /// The load of each frame, and the relative errors common to all.
     pub(super) fn loads(&self, with_strain: bool) -> Result<LoadSeries, PipelineError> {
         let mut loads = Vec::with_capacity(self.frames.len());
         for frame in 0..self.frames.len() {
@@ -619,7 +619,7 @@ impl<'a> Press<'a> {
         let series = loads::series(loads.iter().copied(), bodies, size);
         match self.stages.specimen {
             Specimen::Flat(flat) if with_strain => {
-                // Where all are cut the first is refused.
+                // If all contacts are cut, the first is rejected.
                 let all_cut = loads.iter().all(|load| load.contact.touches_edge);
                 let numbered = loads.iter().map(|load| &load.contact).enumerate();
                 flat.check(numbered.filter(|(_, contact)| all_cut || !contact.touches_edge))?;
@@ -629,33 +629,33 @@ impl<'a> Press<'a> {
         }
     }
 
-    /// Leaves out of the modulus the frames whose contact repeats an earlier one, bit for bit, and
-    /// those whose contact is cut by the frame's edge.
+    /// Excludes from the modulus frames whose contact repeats an earlier one bit for bit, and
+    /// contacts cut by the edge of the frame.
     fn leave_out(&self, loads: &mut [Load]) {
         let mut seen = HashSet::new();
         for (load, frame) in loads.iter_mut().zip(&self.frames) {
             let (contact, gauge) = (&load.contact, frame.gauge.map(|gauge| gauge.value));
             let [x, y] = contact.centroid_px.map(|c| c.value);
-            // Noise moves every one of these: equal bits are those of one image.
+            // Noise changes each of these values, so equal bits come from the same image.
             let values = [load.force_n.value, contact.contact_radius_m.value, x, y];
             let new = seen.insert((values.map(f64::to_bits), gauge.map(f64::to_bits)));
             load.counts = new && !contact.touches_edge;
         }
     }
 
-    /// The frames whose strain enters the modulus: at most 32 of those that repeat no earlier one,
-    /// chosen evenly. A match takes milliseconds, so that thousands would take minutes. The error
-    /// of the mean strain is that of the first surface, which all share, and does not fall with
-    /// more.
+    /// The frames whose strain enters the modulus: at most 32, at even intervals, of those that do
+    /// not repeat an earlier one. A match takes milliseconds, so thousands of them would take
+    /// minutes. More frames would not reduce the error of the mean strain, because it comes from
+    /// the first surface, which all share.
     fn strained_frames(&self, loads: &[Load]) -> Vec<usize> {
         let new: Vec<usize> = (1..loads.len()).filter(|&k| loads[k].counts).collect();
         let kept = new.len().min(32);
-        // The last frame is always one of them.
+        // The last frame is always included.
         (1..=kept).map(|k| new[k * new.len() / kept - 1]).collect()
     }
 
-    /// The largest step of the light since the reference was taken, in grey levels, away from the
-    /// contacts of the frames that were measured.
+    /// The largest change of the light since the reference was taken, in grey levels, outside the
+    /// contacts of the measured frames.
     pub(super) fn light_step_grey(&self) -> Option<f64> {
         let known = self.frames.iter().filter_map(|frame| frame.contact.get());
         let contacts = known.filter_map(|known| known.as_ref().ok());
@@ -664,8 +664,8 @@ impl<'a> Press<'a> {
         steps.max_by(|a, b| a.abs().total_cmp(&b.abs()))
     }
 
-    /// Sets when a frame was taken, in seconds since the object touched. Frames without a time do
-    /// not count where time does.
+    /// Sets when a frame was taken, in seconds since the object touched. Frames without a time are
+    /// ignored in time-dependent results.
     ///
     /// ```
     /// use tactile_simulate::Trial;
@@ -683,7 +683,7 @@ impl<'a> Press<'a> {
     /// ```
     ///
     /// # Errors
-    /// [`PipelineError::NoSuchFrame`], [`PipelineError::Time`] for what is negative or not finite,
+    /// [`PipelineError::NoSuchFrame`], [`PipelineError::Time`] for a negative or non-finite time,
     /// [`PipelineError::TimeDecreases`].
     pub fn set_time_s(&mut self, frame: usize, time_s: f64) -> Result<(), PipelineError> {
         self.loaded(frame)?;
@@ -720,7 +720,7 @@ impl<'a> Press<'a> {
         self.scratch().report.skipped(stage, reason);
     }
 
-    /// When a frame was taken, where that is known.
+    /// When a frame was taken. `None` if unknown.
     pub(super) fn time_s(&self, frame: usize) -> Option<f64> {
         self.frames.get(frame)?.time_s
     }

@@ -1,14 +1,14 @@
-//! The light of a calibration's reference, and how it has changed since.
+//! The light of the calibration's reference, and its change since then.
 use crate::force::{Estimate, ReferenceFrame};
 use ndarray::{ArrayView2, Axis, Slice};
 
 /// Blocks along each side of a frame.
 const BLOCKS: usize = 8;
 
-/// Brightness of a reference in 8 × 8 blocks, kept with a calibration. Lamps and exposure change
-/// background and leaked light by one factor, so that a later reference shows by how much forces
-/// are read wrongly. Stray light of a room changes the background alone and looks the same where
-/// the background is even: a tenth of the change is taken as the factor's error.
+/// Brightness of a reference in 8 × 8 blocks, stored with a calibration. Lamps and exposure change
+/// the background and the leaked light by one factor, so a later reference reveals the error of the
+/// forces. Stray room light changes only the background and, if the background is even, looks the
+/// same: a tenth of the change is therefore the error of the factor.
 ///
 /// ```
 /// use tactile_imaging::{Object, Pipeline, pipeline::ReferenceLight};
@@ -22,7 +22,7 @@ const BLOCKS: usize = 8;
 /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_settings(
 ///     |settings| settings.calibrated_light = Some(ReferenceLight::of(&calibrated)),
 /// )?;
-/// // Lamps that are a tenth darker, and a reference that was taken anew.
+/// // The lamps are a tenth darker, and a new reference was taken.
 /// let mut press = pipeline.press(hertz(0.9, 0.0).view())?;
 /// press.add_frame(hertz(0.9, 120.0));
 /// let force = press.contact(0)?.and_then(|c| c.force_n).expect("a force");
@@ -32,14 +32,14 @@ const BLOCKS: usize = 8;
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ReferenceLight {
-    /// Mean grey level of every block, row by row.
+    /// Mean grey level of each block, row by row.
     pub grey: Vec<f64>,
-    /// Standard error of one of them from noise.
+    /// Standard error of one block from noise.
     pub error_grey: f64,
 }
 
 impl ReferenceLight {
-    /// Of a reference. O(pixels).
+    /// Computes the brightness of a reference. O(pixels).
     #[must_use]
     pub fn of(reference: &ReferenceFrame) -> Self {
         let image = reference.image();
@@ -65,7 +65,7 @@ impl ReferenceLight {
         }
     }
 
-    /// How the light has changed since. `None` where there is too little light to tell.
+    /// The change of the light since then. `None` if there is too little light to measure it.
     pub(super) fn changed(&self, now: &ReferenceFrame) -> Option<LightChange> {
         let now = Self::of(now);
         let sum = |f: &dyn Fn(f64, f64) -> f64| -> f64 {
@@ -76,7 +76,7 @@ impl ReferenceLight {
         let gain = sum(&|then, now| then * now) / squares;
         let noise = now.error_grey.hypot(gain * self.error_grey);
         let error = noise / squares.sqrt();
-        // A factor that is not known to half a per cent corrects nothing.
+        // A factor with an error above half a per cent corrects nothing.
         let known = self.grey.len() == now.grey.len() && gain > 0.0 && error < 5e-3;
         if !known {
             return None;
@@ -96,10 +96,10 @@ impl ReferenceLight {
 /// The change of the light since the calibration.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LightChange {
-    /// The factor common to all of the frame.
+    /// The factor common to the whole frame.
     pub gain: Estimate,
-    /// What is no common factor: root mean square over the blocks, relative.
+    /// Deviation from a common factor: relative root mean square over the blocks.
     pub uneven: f64,
-    /// Whether it is worth a caution.
+    /// Whether the change deserves a caution.
     pub seen: bool,
 }

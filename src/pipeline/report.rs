@@ -1,4 +1,4 @@
-//! What was computed, what was skipped and why.
+//! Record of the stages that ran and those that were skipped, with the reason.
 use std::fmt;
 use std::time::Duration;
 
@@ -8,7 +8,7 @@ use std::time::Duration;
 /// use tactile_simulate::Trial;
 /// let trial = Trial::coarser(8)?;
 /// use tactile_imaging::pipeline::Stage;
-/// // What a ball's modulus takes: both contacts, and no surface.
+/// // The modulus of a ball needs both contacts and no surface.
 /// let pipeline = trial.pipeline()?;
 /// let press = trial.press(&pipeline)?;
 /// press.modulus()?;
@@ -26,22 +26,22 @@ use std::time::Duration;
 )]
 #[non_exhaustive]
 pub enum Stage {
-    /// Contact, force, centroid and radius.
+    /// From a frame to contact, force, centroid and radius.
     Contact,
-    /// Image to surface.
+    /// From an image to a surface.
     Surface,
-    /// Surface to control points.
+    /// From a surface to control points.
     ControlPoints,
-    /// Points to matches.
+    /// From points to matches.
     Match,
-    /// Matches to a warp, and its strain.
+    /// From matches to a warp and its strain.
     Strain,
-    /// Loads to a modulus.
+    /// From loads to a modulus.
     Modulus,
 }
 
 impl Stage {
-    /// All stages, in order.
+    /// All stages in order.
     pub const ALL: [Self; 6] = [
         Self::Contact,
         Self::Surface,
@@ -65,7 +65,7 @@ impl fmt::Display for Stage {
     }
 }
 
-/// Why work was left out.
+/// Why a stage was skipped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",
@@ -74,13 +74,13 @@ impl fmt::Display for Stage {
 )]
 #[non_exhaustive]
 pub enum SkipReason {
-    /// Nobody asked for it.
+    /// The result was not requested.
     NotAsked,
     /// The frame shows no contact.
     NoContact,
-    /// The surface, points and spline of the load that strain is counted from are kept.
+    /// Surface, points and spline of the load from which strain is counted were kept.
     KeptFromBefore,
-    /// The match began where the last one ended.
+    /// The match started from the last answer.
     NearLastAnswer,
 }
 
@@ -95,7 +95,7 @@ impl fmt::Display for SkipReason {
     }
 }
 
-/// Work of one kind that was left out.
+/// Work of one kind that was skipped.
 ///
 /// ```
 /// use tactile_imaging::pipeline::{Object, Pipeline, SkipReason, Stage};
@@ -117,9 +117,9 @@ impl fmt::Display for SkipReason {
 pub struct Skip {
     /// The stage.
     pub stage: Stage,
-    /// Why.
+    /// The reason.
     pub reason: SkipReason,
-    /// Number of frames in which it was left out.
+    /// Number of frames in which the stage was skipped.
     pub frames: usize,
 }
 
@@ -135,7 +135,7 @@ impl fmt::Display for Skip {
     }
 }
 
-/// How often a stage ran, and for how long.
+/// Number of runs of a stage, and their total time.
 ///
 /// ```
 /// use std::time::Duration;
@@ -147,7 +147,7 @@ impl fmt::Display for Skip {
 pub struct Work {
     /// Number of runs.
     pub runs: usize,
-    /// Time of all of them.
+    /// Total time of the runs.
     pub time: Duration,
 }
 
@@ -163,7 +163,7 @@ impl fmt::Display for Work {
     }
 }
 
-/// What was computed, what was skipped and why.
+/// Record of the stages that ran and those that were skipped, with the reason.
 ///
 /// ```
 /// use tactile_simulate::Trial;
@@ -173,7 +173,7 @@ impl fmt::Display for Work {
 /// let press = trial.press(&pipeline)?;
 /// press.surface(1)?;
 /// let report: Report = press.report();
-/// // The second surface has the grid of the first, which needs both contacts.
+/// // The second surface uses the grid of the first, which needs both contacts.
 /// assert_eq!((report.work(Stage::Contact).runs, report.work(Stage::Surface).runs), (2, 1));
 /// assert!(report.to_string().contains("in 2 runs"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -181,12 +181,12 @@ impl fmt::Display for Work {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
     work: [Work; 6],
-    /// What was skipped.
+    /// Skipped work.
     pub skips: Vec<Skip>,
 }
 
 impl Report {
-    /// How often a stage ran, and for how long.
+    /// Number of runs of a stage, and their total time.
     pub fn work(&self, stage: Stage) -> Work {
         self.work[stage as usize]
     }

@@ -1,4 +1,4 @@
-//! The answers of a press as plain data, for people ([`Display`]) and programs (feature `serde`).
+//! The results of a press as plain data, for people ([`Display`]) and programs (feature `serde`).
 use super::assumptions::{CheckedGain, CheckedGuide};
 use super::budget::{self, ErrorShare};
 use super::contact::ContactReading;
@@ -37,14 +37,14 @@ use std::fmt::{self, Display, Formatter};
 pub struct ModulusResult {
     /// Young's modulus in pascals.
     pub value: f64,
-    /// Its standard error in pascals.
+    /// Standard error in pascals.
     pub standard_error: f64,
-    /// Its 95 % interval in pascals. No upper end where the loads do not bound it.
+    /// 95 % interval in pascals. The upper end is `None` if the loads do not bound it.
     pub interval_95: (f64, Option<f64>),
-    /// Which estimator.
+    /// The estimator.
     #[cfg_attr(feature = "serde", serde(serialize_with = "outcome::text"))]
     pub estimator: EstimatorKind,
-    /// Where the estimator's assumptions fail.
+    /// Violated assumptions of the estimator.
     #[cfg_attr(feature = "serde", serde(serialize_with = "outcome::texts"))]
     pub warnings: Vec<Warning>,
 }
@@ -61,7 +61,7 @@ impl From<&ModulusEstimate> for ModulusResult {
     }
 }
 
-/// What one frame says.
+/// Results of one frame.
 ///
 /// ```
 /// use tactile_simulate::Trial;
@@ -87,9 +87,9 @@ pub struct FrameResult {
     /// Normal force in newtons.
     #[cfg_attr(feature = "serde", serde(serialize_with = "outcome::one"))]
     pub force_n: Result<Estimate, PipelineError>,
-    /// What a gauge read, in newtons.
+    /// Force by a gauge, in newtons. `None` without a gauge reading.
     pub gauge_force_n: Option<f64>,
-    /// Contact radius in metres. Of a flat face that of a disc of its area.
+    /// Contact radius in metres. For a flat face it is that of a disc of equal area.
     pub contact_radius_m: Estimate,
     /// Contact radius over the ball's radius: small-contact theory holds up to 0.3.
     pub contact_ratio: Option<f64>,
@@ -99,18 +99,18 @@ pub struct FrameResult {
     pub contact_area_m2: f64,
     /// F/(π a²) in pascals.
     pub mean_stress_pa: Option<Estimate>,
-    /// Greatest height of the reconstructed surface in metres.
+    /// Maximum height of the reconstructed surface in metres.
     #[cfg_attr(feature = "serde", serde(serialize_with = "outcome::one"))]
     pub surface_height_m: Result<Estimate, PipelineError>,
-    /// Whether that surface is apparent: the pressure, read as shading. The face of the sensor has
-    /// another shape.
+    /// Whether the surface is apparent: the pressure interpreted as shading. The face of the sensor
+    /// has another shape.
     pub surface_apparent: bool,
-    /// Depth in metres to which a ball presses the guide on the axis, by the law of its layers. See
-    /// [`Press::guide_depression_m`](super::Press::guide_depression_m).
+    /// Indentation of the guide by a ball on the axis, in metres, by the law of the guide's layers.
+    /// See
     pub guide_depression_m: Option<Estimate>,
 }
 
-/// How the control points of the first and the last frame were matched.
+/// Summary of the match between the control points of the first and the last frame.
 ///
 /// ```
 /// use tactile_simulate::Trial;
@@ -131,7 +131,7 @@ pub struct FrameResult {
 pub struct MatchResult {
     /// Control points on the first surface.
     pub points: usize,
-    /// Those with a partner on the last.
+    /// Control points with a partner on the last surface.
     pub matched: usize,
     /// Mean confidence of the matches.
     pub mean_confidence: f64,
@@ -139,7 +139,7 @@ pub struct MatchResult {
     pub residual_m: f64,
     /// Mean length of the displacement in metres.
     pub mean_displacement_m: f64,
-    /// Iterations.
+    /// Iterations of the matcher.
     pub iterations: usize,
     /// Why the matcher stopped.
     pub stop: StopReason,
@@ -161,25 +161,25 @@ pub struct MatchResult {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct StrainResult {
-    /// The name of the measure of strain.
+    /// Name of the strain measure.
     pub measure: &'static str,
-    /// Whether it is that of apparent surfaces ([`FrameResult::surface_apparent`]), and not of a
-    /// material: under a ball e_zz is above zero.
+    /// Whether the strain is that of apparent surfaces ([`FrameResult::surface_apparent`]) rather
+    /// than of a material. Under a ball e_zz is then positive.
     pub apparent: bool,
-    /// Mean over the control points, rows of the tensor (x, y, z).
+    /// Mean over the control points, as rows of the tensor (x, y, z).
     pub mean: [[f64; 3]; 3],
     /// Standard error of the mean.
     pub standard_error: [[f64; 3]; 3],
     /// Standard deviation over the control points.
     pub spread: [[f64; 3]; 3],
-    /// Control points that count.
+    /// Number of control points used.
     pub used: usize,
-    /// Control points where the warp folds over.
+    /// Number of control points where the warp folds.
     pub folded: usize,
 }
 
-/// All results of a press: what a stage computed, or why it could not, whatever became of the
-/// others.
+/// All results of a press. Each is the result of a stage or the error that prevented it,
+/// independently of the other stages.
 ///
 /// ```
 /// use tactile_simulate::Trial;
@@ -200,18 +200,17 @@ pub struct Measurement {
     /// Young's modulus by the pipeline's estimator.
     #[cfg_attr(feature = "serde", serde(serialize_with = "outcome::one"))]
     pub youngs_modulus_pa: Result<ModulusResult, PipelineError>,
-    /// The time that the modulus is of, where frames say when they were taken, and whether it
-    /// changed meanwhile.
+    /// Time range of the modulus and its change in that range. `None` if the frames have no times.
     pub time: Option<TimeResult>,
-    /// The gain that presses of known force show, where there are any.
+    /// Gain of the sensor by presses of known force. `None` without such presses.
     pub checked_gain: Option<CheckedGain>,
-    /// What presses of balls of known modulus show of the guide, where there are any.
+    /// Stiffness of the guide by presses of balls of known modulus. `None` without such presses.
     pub checked_guide: Option<CheckedGuide>,
-    /// Which inputs the modulus' error comes from, the largest first. Empty without a modulus.
+    /// Error sources of the modulus, the largest first. Empty without a modulus.
     pub error_budget: Vec<ErrorShare>,
-    /// By every estimator that the frames allow, the paper's ratio first.
+    /// Moduli by every estimator that the frames permit, the paper's ratio first.
     pub estimators: Vec<ModulusResult>,
-    /// What every frame says.
+    /// Results of each frame.
     #[cfg_attr(feature = "serde", serde(serialize_with = "outcome::each"))]
     pub frames: Vec<Result<FrameResult, PipelineError>>,
     /// The strain between the first frame and the last.
@@ -226,7 +225,7 @@ pub struct Measurement {
     /// Cautions.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
     pub flags: Vec<Flag>,
-    /// What was computed and what was skipped.
+    /// Record of the stages that ran and those that were skipped.
     pub report: Report,
 }
 
@@ -239,7 +238,7 @@ impl Display for ModulusResult {
             let ends = interval_text((low, high), error, 1e-3);
             write!(f, "   95 %: {ends} kPa")?;
         } else {
-            f.write_str("   no interval: the errors are not known")?;
+            f.write_str("   no interval: the errors are unknown")?;
         }
         write!(f, "   ({})", self.estimator)
     }
@@ -294,7 +293,7 @@ impl Display for MatchResult {
 impl Display for StrainResult {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         // The strain between equal frames is zero to rounding: digits beyond the sixth are never
-        // known.
+        // significant.
         let error = |i: usize, j: usize| self.standard_error[i][j].max(1e-6);
         let e = |i: usize, j: usize| with_error(self.mean[i][j], error(i, j), 1.0);
         write!(
@@ -305,7 +304,7 @@ impl Display for StrainResult {
             e(1, 1),
             e(2, 2),
             if self.apparent {
-                "   (of the apparent surface: the pressure, read as shading)"
+                "   (of the apparent surface: the pressure interpreted as shading)"
             } else {
                 ""
             }
@@ -313,8 +312,8 @@ impl Display for StrainResult {
     }
 }
 
-/// The first three cautions of every kind, and how many more there are: of a press with thousands
-/// of frames each may carry the same one.
+/// Writes the first three cautions of each kind and the number of further ones: in a press of
+/// thousands of frames each may have the same caution.
 fn cautions(f: &mut Formatter<'_>, flags: &[Flag]) -> fmt::Result {
     let kind = |flag: &Flag| {
         let warning = match flag {
@@ -341,7 +340,7 @@ fn cautions(f: &mut Formatter<'_>, flags: &[Flag]) -> fmt::Result {
     Ok(())
 }
 
-/// A result under its heading, or why there is none.
+/// Writes a result under its heading, or the reason why there is none.
 fn line<T: Display>(
     f: &mut Formatter<'_>,
     heading: &str,

@@ -1,12 +1,12 @@
 //! A session: one sensor, one object, a stream of frames.
 //!
-//! The first frames without contact make the reference. Then every frame gives its contact and
-//! force, and every contact refines the modulus. Shear is followed where its stiffnesses are known,
-//! drift of the light watched in frames without contact. Strain is followed on request
-//! ([`Session::strain`]), from the load where that began: its surface, points and spline are kept,
-//! and each match begins where the last one ended. Memory is constant: similar loads are merged.
-//! [`Session::push`] and, with the default stages, [`Session::strain`] allocate nothing once their
-//! buffers have their size.
+//! The first frames without contact make the reference. Then each frame gives its contact and
+//! force, and each contact refines the modulus. Shear is followed if the stiffnesses are known, and
+//! drift of the light is monitored in frames without contact. Strain is followed on request
+//! ([`Session::strain`]), from the load of the first request: the surface, points and spline of
+//! that load are kept, and each match starts from the last answer. Memory is constant, because
+//! similar loads are merged. [`Session::push`] and, with the default stages, [`Session::strain`]
+//! allocate nothing once their buffers have grown.
 use super::contact::{ContactReading, FrameContact, resize};
 use super::error::PipelineError;
 use super::flag::Flag;
@@ -23,7 +23,7 @@ use crate::matching::{MatchReport, MatchedPairs, WarmStart};
 use ndarray::{Array2, ArrayView2};
 use std::sync::Arc;
 
-/// The answer of a stream to one frame.
+/// The results of one frame of a stream.
 ///
 /// ```
 /// use tactile_imaging::pipeline::{Session, Update};
@@ -40,13 +40,13 @@ use std::sync::Arc;
 pub struct Update {
     /// Number of the frame, counted from 0.
     pub frame: u64,
-    /// The contact. `None` where nothing touches.
+    /// The contact. `None` without contact.
     pub contact: Option<ContactReading>,
-    /// Shear since contact began, where the session knows the stiffnesses.
+    /// Shear since contact began. `None` if the session has no shear stiffnesses.
     pub shear: Option<ShearMeasurement>,
 }
 
-/// Drift of the light since the reference was taken, seen in frames without contact, in grey
+/// Drift of the light since the reference was taken, measured in frames without contact, in grey
 /// levels: the mean of frame minus reference.
 ///
 /// ```
@@ -74,19 +74,19 @@ pub struct Update {
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct DriftWatch {
-    /// Frames without contact so far.
+    /// Number of frames without contact so far.
     pub frames: u64,
-    /// In the last of them.
+    /// Drift in the last of them.
     pub last_grey: f64,
-    /// The greatest so far, with its sign.
+    /// The largest drift so far, with its sign.
     pub greatest_grey: f64,
-    /// The light had drifted by more than half a grey level when the sensor was last free: the
-    /// reference should be taken anew, or the contact stage told to correct drift.
+    /// Set if the light had drifted by more than half a grey level when the sensor was last free.
+    /// Take a new reference, or let the contact stage correct drift.
     pub caution: Option<Flag>,
 }
 
 impl DriftWatch {
-    /// Drift beyond which the reference should be taken anew.
+    /// Drift above which a new reference should be taken.
     const LIMIT_GREY: f64 = 0.5;
 
     fn watch(&mut self, grey: f64) {
@@ -99,7 +99,8 @@ impl DriftWatch {
     }
 }
 
-/// Follows a stream of frames from one sensor pressed on one object. `Send`: one session a thread.
+/// Follows a stream of frames from one sensor pressed against one object. It is `Send`: use one
+/// session per thread.
 ///
 /// ```
 /// use tactile_imaging::pipeline::Session;
@@ -126,26 +127,26 @@ pub struct Session {
     scratch: Scratch,
     contact: FrameContact,
     last: Array2<u8>,
-    /// Whether `contact` is that of `last`, and which frame that was.
+    /// Whether `contact` belongs to the frame `last`, and the number of that frame.
     measured: bool,
     measured_frame: u64,
     frames: u64,
     loads: SeenLoads,
     shear: Option<ShearTracker>,
     strain: FollowedStrain,
-    /// The first contact that a flat face's loads are compared with.
+    /// The first contact, with which the loads of a flat face are compared.
     first_contact: Option<ContactReading>,
     drift: DriftWatch,
-    /// The surface that was last asked for.
+    /// The last requested surface.
     surface: ContactSurface,
 }
 
 impl Session {
-    /// Loads that a session keeps apart. More are merged.
+    /// Number of loads that a session keeps separate. Further loads are merged.
     pub const MOST_LOADS: usize = MOST_LOADS;
 
-    /// A session whose reference is the mean of one or more frames without contact. Of more, the
-    /// noise is measured too.
+    /// Starts a session whose reference is the mean of one or more frames without contact. From two
+    /// frames on, their noise is measured too.
     ///
     /// ```
     /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
@@ -191,8 +192,8 @@ impl Session {
         })
     }
 
-    /// Follows shear too: F_x = K_x u_x, F_y = K_y u_y, u the way of the centroid since contact
-    /// began.
+    /// Also follows shear: F_x = K_x u_x, F_y = K_y u_y, where u is the displacement of the
+    /// centroid since contact began.
     ///
     /// ```
     /// use ndarray::Array2;
@@ -224,11 +225,11 @@ impl Session {
         self
     }
 
-    /// Measures the next frame. A contact that is alone, whole, unsaturated and inside the
-    /// calibration refines the modulus; a frame without contact is watched for drift of the light.
+    /// Measures the next frame. A contact that is single, complete, unsaturated and within the
+    /// calibration refines the modulus. A frame without contact updates the drift of the light.
     ///
     /// # Errors
-    /// [`PipelineError::Contact`]. The session can go on with the next frame.
+    /// [`PipelineError::Contact`]. The session can continue with the next frame.
     pub fn push(&mut self, frame: ArrayView2<'_, u8>) -> Result<Update, PipelineError> {
         let number = self.frames;
         self.frames += 1;
@@ -257,8 +258,8 @@ impl Session {
             .contact(scratch, number as usize, frame, None, contact)?;
         self.measured = true;
         self.measured_frame = number;
-        // Equal readings are those of one image, which noise moves: counted twice it would not be
-        // better known.
+        // Noise changes the readings, so equal readings come from the same image. Counting them
+        // twice would add no information.
         if let Some(reading) = self.contact.reading
             && before != Some(reading)
         {
@@ -279,15 +280,15 @@ impl Session {
         Ok(())
     }
 
-    /// The cautions about the last frame. Empty before the first and after one that could not be
-    /// measured.
+    /// The cautions about the last frame. Empty before the first frame and after a frame that could
+    /// not be measured.
     ///
     /// ```
     /// use tactile_imaging::pipeline::{Flag, Session};
     /// use tactile_simulate::Trial;
     /// let trial = Trial::coarser(8)?;
     /// let frames = [&trial.simulation.reference, &trial.simulation.frames[0]];
-    /// // The camera sees the right half.
+    /// // The camera sees the right half of the contact.
     /// let [reference, frame] = frames.map(|image| image.slice(ndarray::s![.., 87..]));
     /// let mut session = Session::new(&trial.pipeline()?, &[reference])?;
     /// session.push(frame)?;
@@ -303,7 +304,7 @@ impl Session {
             .cautions(frame, self.last.view(), &self.contact, None)
     }
 
-    /// Refuses a contact that is not that of one flat face, the same as in the first frame.
+    /// Rejects a contact that is not that of one flat face, the same as in the first frame.
     fn check_face(
         &self,
         flat: FlatSpecimen,
@@ -318,7 +319,7 @@ impl Session {
         self.frames
     }
 
-    /// Loads kept apart so far, at most [`MOST_LOADS`](Self::MOST_LOADS).
+    /// Number of separate loads so far, at most [`MOST_LOADS`](Self::MOST_LOADS).
     ///
     /// ```
     /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
@@ -349,7 +350,7 @@ impl Session {
         self.loads.len()
     }
 
-    /// Drift of the light, seen in frames without contact.
+    /// Drift of the light in frames without contact.
     ///
     /// ```
     /// use tactile_imaging::pipeline::Flag;
@@ -375,7 +376,7 @@ impl Session {
         &self.drift
     }
 
-    /// The stages that ran so far, and those that were skipped.
+    /// The stages that ran so far and those that were skipped.
     ///
     /// ```
     /// use tactile_imaging::pipeline::{Session, SkipReason, Stage};
@@ -395,8 +396,8 @@ impl Session {
         &self.scratch.report
     }
 
-    /// The surface of the last frame's contact, on the grid that suits its size. Every call
-    /// computes it, in memory that is kept.
+    /// The surface of the last frame's contact, on a grid that suits its size. Each call computes
+    /// it again, reusing memory.
     ///
     /// ```
     /// use tactile_imaging::pipeline::Session;
@@ -406,14 +407,14 @@ impl Session {
     /// session.push(trial.simulation.frames[0].view())?;
     /// let heights = &session.surface()?.surface.heights;
     /// let top = heights.iter().copied().filter(|h| h.is_finite()).fold(0.0, f64::max);
-    /// // Hertz's pressure read as shading is a hemisphere as high as the contact's radius.
+    /// // Hertz's pressure interpreted as shading is a hemisphere of the contact's radius.
     /// let radius = trial.simulation.truth[0].contact.contact_radius_m;
     /// assert!((top / radius - 1.0).abs() < 0.1);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
     /// # Errors
-    /// [`PipelineError::NoContact`] where nothing touches, [`PipelineError::Surface`].
+    /// [`PipelineError::NoContact`] without contact, [`PipelineError::Surface`].
     pub fn surface(&mut self) -> Result<&ContactSurface, PipelineError> {
         self.last_reading()?;
         self.stages.surface(
@@ -427,7 +428,7 @@ impl Session {
         Ok(&self.surface)
     }
 
-    /// The last frame's contact, or that there is none.
+    /// The last frame's contact. Without contact it is an error.
     fn last_reading(&self) -> Result<ContactReading, PipelineError> {
         let reading = self.contact.reading.filter(|_| self.measured);
         reading.ok_or(PipelineError::NoContact {
@@ -435,12 +436,12 @@ impl Session {
         })
     }
 
-    /// Strain of the last frame against the load where strain began to be asked for. That load's
-    /// own answer is `None`.
+    /// Strain of the last frame relative to the load of the first request. For that load itself the
+    /// result is `None`.
     ///
-    /// The first call makes its frame's load the one that strains are counted from, until
-    /// [`restart_strain`](Self::restart_strain). Costs the surface, control points, match and
-    /// strain of one frame. A call without a new frame costs nothing.
+    /// The first call makes the load of its frame the origin of strain, until
+    /// [`restart_strain`](Self::restart_strain) is called. A call costs the surface, control
+    /// points, match and strain of one frame. A repeated call without a new frame costs nothing.
     ///
     /// ```
     /// use tactile_imaging::pipeline::Session;
@@ -462,7 +463,7 @@ impl Session {
     ///     session.push(frame.view())?;
     ///     across.extend(session.strain()?.map(|found| found.strain.summary.mean[(0, 0)]));
     /// }
-    /// // From 0.7 N the surface of a ball grows with the cube root of the load.
+    /// // From 0.7 N on, the surface of a ball grows with the cube root of the load.
     /// let truth = |force: f64| 0.5 * ((force / 0.7_f64).powf(2.0 / 3.0) - 1.0);
     /// assert_eq!(across.len(), 2);
     /// assert!((across[0] - truth(1.0)).abs() < 0.02 && (across[1] - truth(1.2)).abs() < 0.02);
@@ -470,8 +471,8 @@ impl Session {
     /// ```
     ///
     /// # Errors
-    /// [`PipelineError::NoContact`] where nothing touches. Those of a
-    /// [`Press`](crate::pipeline::Press)'s strain.
+    /// [`PipelineError::NoContact`] without contact, and the errors of the strain of a
+    ///  [`Press`](crate::pipeline::Press).
     pub fn strain(&mut self) -> Result<Option<&SessionStrain>, PipelineError> {
         let frame = Frame {
             reading: self.last_reading()?,
@@ -482,7 +483,7 @@ impl Session {
         self.strain.follow(&self.stages, &mut self.scratch, &frame)
     }
 
-    /// Counts strain anew, from the next load that [`strain`](Self::strain) is asked for.
+    /// Makes the load of the next call of [`strain`](Self::strain) the new origin of strain.
     ///
     /// ```
     /// use tactile_imaging::pipeline::Session;
@@ -500,11 +501,12 @@ impl Session {
         self.strain = FollowedStrain::default();
     }
 
-    /// Young's modulus from all loads so far, by the estimator of the pipeline. Where that needs
-    /// strain the loads are those whose [`strain`](Self::strain) was asked for; of a flat face all.
+    /// Young's modulus from all loads so far, by the estimator of the pipeline. If the estimator
+    /// needs strain, only loads with a requested [`strain`](Self::strain) are used; for a flat face
+    /// all are.
     ///
     /// # Errors
-    /// [`PipelineError::Modulus`]. [`PipelineError::NotUniaxial`] where the last contact is not
+    /// [`PipelineError::Modulus`], and [`PipelineError::NotUniaxial`] if the last contact is not
     /// that of a flat face.
     pub fn modulus(&mut self) -> Result<ModulusEstimate, PipelineError> {
         let pipeline = &self.stages.pipeline;
@@ -549,20 +551,20 @@ impl Session {
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct SessionStrain {
-    /// The frame from whose load strain is counted, from 0.
+    /// The frame whose load is the origin of strain, from 0.
     pub from: u64,
     /// The strained frame.
     pub to: u64,
-    /// Control points with a partner on the strained surface; 0 of a flat face, whose strain is
-    /// that of its area.
+    /// Number of control points with a partner on the strained surface. It is 0 for a flat face,
+    /// whose strain follows from its area.
     pub matched: usize,
-    /// How the match went.
+    /// Report of the match.
     pub report: MatchReport,
-    /// The strain at the control points of the load it is counted from.
+    /// The strain at the control points of the original load.
     pub strain: PairStrain,
 }
 
-/// The frame whose strain is asked for.
+/// The frame whose strain is requested.
 struct Frame<'a> {
     number: u64,
     image: ArrayView2<'a, u8>,
@@ -570,17 +572,17 @@ struct Frame<'a> {
     reading: ContactReading,
 }
 
-/// The load that strain is counted from.
+/// The load that is the origin of strain.
 struct Anchor {
     frame: u64,
     reading: ContactReading,
-    /// Pixels of its contact: all surfaces have its grid.
+    /// Number of pixels of its contact: all surfaces use its grid.
     pixels: usize,
-    /// None of a flat face, whose strain is that of its area.
+    /// `None` for a flat face, whose strain follows from its area.
     points: Option<ControlPoints>,
 }
 
-/// Memory of the stages before the strain.
+/// Working memory of the stages before the strain.
 #[derive(Default)]
 struct Buffers {
     surface: ContactSurface,
@@ -589,7 +591,7 @@ struct Buffers {
 }
 
 impl Buffers {
-    /// The control points of a frame's surface, into `points`.
+    /// Writes the control points of a frame's surface into `points`.
     fn sample(
         &mut self,
         stages: &Stages,
@@ -610,7 +612,7 @@ impl Buffers {
     }
 }
 
-/// Strain from frame to frame.
+/// Strain followed from frame to frame.
 #[derive(Default)]
 struct FollowedStrain {
     anchor: Option<Anchor>,
@@ -621,7 +623,7 @@ struct FollowedStrain {
 }
 
 impl FollowedStrain {
-    /// The strain of `frame`. `None` where it is the one that strain is counted from.
+    /// The strain of `frame`. `None` if it is the origin of strain.
     fn follow(
         &mut self,
         stages: &Stages,
@@ -650,7 +652,7 @@ impl FollowedStrain {
         }
         let known = |last: &SessionStrain| last.to == frame.number;
         if !self.last.as_ref().is_some_and(known) {
-            // A strain that fails leaves none behind.
+            // If the strain fails, no earlier strain remains.
             let mut found = self.last.take().unwrap_or_default();
             (found.from, found.to) = (anchor.frame, frame.number);
             let (buffers, warm) = (&mut self.buffers, &mut self.warm);
@@ -665,7 +667,7 @@ impl FollowedStrain {
         Ok(self.last.as_ref())
     }
 
-    /// The load that strain is counted from, then all others with their strains.
+    /// The load at the origin of strain, then all others with their strains.
     fn loads(&self) -> impl Iterator<Item = Load> + Clone + '_ {
         let anchor = self.anchor.as_ref();
         let first = anchor.and_then(|anchor| Load::of(&anchor.reading));

@@ -1,4 +1,4 @@
-//! Settings of a pipeline beside its stages.
+//! Settings of a pipeline besides its stages.
 use super::assumptions::{Assumption, Assumptions, CheckedGain, CheckedGuide};
 use super::error::PipelineError;
 use super::reference_light::ReferenceLight;
@@ -10,17 +10,17 @@ use crate::elasticity::modulus::Bodies;
 use crate::sfs::Binning;
 use nalgebra::{DMatrix, DVector};
 
-/// Control points on each surface where nothing else is asked for: the paper's number.
+/// Default number of control points on each surface, as in the paper.
 pub(crate) const DEFAULT_CONTROL_POINTS: usize = 200;
 
-/// What a covariance of layers must have.
-const THREE_PER_LAYER: &str = "as many rows and columns as the layers have ln E, ln h and ν";
+/// Requirement on a covariance of layers.
+const THREE_PER_LAYER: &str = "three rows and columns per layer (ln E, ln h, ν)";
 
-/// What of the frame the surface stage looks at.
+/// The part of the frame's information that the surface stage gets.
 ///
 /// ```
 /// use tactile_imaging::pipeline::{DarkContact, Object, Pipeline, SurfaceInput};
-/// // A table of depths wants grey levels; shape from shading, the default, the cosine of the
+/// // A depth table needs grey levels; shape from shading, the default, needs the cosine of the
 /// // slope.
 /// use tactile_imaging::force::CalibrationPair;
 /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
@@ -33,15 +33,16 @@ const THREE_PER_LAYER: &str = "as many rows and columns as the layers have ln E,
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SurfaceInput {
-    /// Signal over its greatest value, from 0 to 1: the cosine of the slope under frontal light.
+    /// The signal relative to its largest value, from 0 to 1: the cosine of the slope under frontal
+    /// light.
     #[default]
     Shading,
     /// The signal itself: grey levels above (or, for sensors that darken, below) the reference.
     Signal,
 }
 
-/// Settings of a pipeline beside its stages.
-/// [`Pipeline::with_settings`](super::Pipeline::with_settings) changes it.
+/// Settings of a pipeline besides its stages, changed by
+///  [`Pipeline::with_settings`](super::Pipeline::with_settings).
 ///
 /// ```
 /// use tactile_imaging::pipeline::{Binning, Object, Pipeline, Settings};
@@ -61,42 +62,42 @@ pub enum SurfaceInput {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// What is pressed.
+    /// The pressed object.
     pub object: Object,
-    /// The sensor's layers. `None`: rigid beside the object.
+    /// The sensor's layers. `None` if they are rigid compared with the object.
     pub waveguide: Option<Waveguide>,
-    /// Number of control points on each surface. The paper's 200 by default.
+    /// Number of control points on each surface. The default is 200, as in the paper.
     pub control_points: usize,
-    /// What of the frame the surface stage looks at.
+    /// The input of the surface stage.
     pub surface_input: SurfaceInput,
-    /// Width in pixels (odd) of the box that smooths the signal, twice along each axis, before the
-    /// surface stage; 1 for none. Where the surface is nearly level its slope √(1/I² − 1) turns
-    /// noise of the shading I into height.
+    /// Width in pixels (odd) of the box filter applied twice along each axis to the signal before
+    /// the surface stage; 1 for no filter. If the surface is nearly level, its slope √(1/I² − 1)
+    /// amplifies noise of the shading I.
     pub smoothing_px: usize,
     /// Grid of the surface stage.
     pub binning: Binning,
-    /// Whether differences are divided by the brightness that the reference has there: vignetting
-    /// then costs no force. Right where stray light and signal come through the same lens, and the
-    /// calibration was taken in the frame's middle.
+    /// Whether differences are divided by the local brightness of the reference, so that vignetting
+    /// does not reduce the force. This is correct if stray light and signal come through the same
+    /// lens and the calibration was taken in the centre of the frame.
     pub flat_field: bool,
-    /// The standard errors of the inputs: stated, or assumed.
+    /// The standard errors of the inputs: stated or default.
     pub assumptions: Assumptions,
-    /// Covariance of ln E of all layers of the waveguide, then of ln h, then of ν. `None`: the
-    /// moduli of all layers are wrong by one factor, with the error of [`Source::Guide`].
+    /// Covariance of ln E of all layers of the waveguide, then of ln h, then of ν. If `None`, the
+    /// moduli of all layers have one common factor, with the error of [`Source::Guide`].
     pub layer_covariance: Option<DMatrix<f64>>,
-    /// Covariances of the same parameters with the logarithm of measured lengths: the pixels that
-    /// measure the object have measured the contacts of the balls that checked the layers, too.
-    /// `None`: zero.
+    /// Covariances of the same parameters with the logarithm of measured lengths, because the
+    /// pixels that measure the object also measured the contacts of the balls that checked the
+    /// layers. `None` for zero.
     pub layers_with_length: Option<DVector<f64>>,
-    /// The light of the reference that forces were calibrated on. Forces read from light are
-    /// divided by the factor by which a press's reference is brighter. `None`: the light is taken
-    /// to be the same.
+    /// The light of the reference at the calibration of the forces. Forces read from light are
+    /// divided by the factor by which the reference of a press is brighter. If `None`, the light is
+    /// assumed unchanged.
     pub calibrated_light: Option<ReferenceLight>,
-    /// The gain that presses of known force show. Forces that are read from light are divided by
-    /// it, and its error stands in place of that of [`Source::Coupling`].
+    /// The gain by presses of known force. Forces read from light are divided by it, and its error
+    /// replaces that of [`Source::Coupling`].
     pub checked_gain: Option<CheckedGain>,
-    /// What presses of balls of known modulus show of the waveguide. `waveguide` and
-    /// `layer_covariance` are those after these presses.
+    /// The stiffness of the waveguide by presses of balls of known modulus. `waveguide` and
+    /// `layer_covariance` are the values after these presses.
     pub checked_guide: Option<CheckedGuide>,
 }
 
@@ -120,8 +121,8 @@ impl Settings {
         }
     }
 
-    /// States errors beside those that are stated. One of the layers' common factor
-    /// ([`Source::Guide`]) takes the place of a covariance of the layers, as of a calibrated sensor.
+    /// Adds stated errors. An error of the layers' common factor ([`Source::Guide`]) replaces a
+    /// covariance of the layers, such as that of a calibrated sensor.
     ///
     /// ```
     /// use tactile_imaging::force::Source;
@@ -144,8 +145,8 @@ impl Settings {
         }
     }
 
-    /// States that every input which is not stated yet is exact, but for light that is uneven over
-    /// the frame: for frames whose truth is known.
+    /// States that every input without a stated error is exact, except for uneven light over the
+    /// frame. Use it for frames with known truth.
     ///
     /// ```
     /// use tactile_imaging::{Object, Pipeline, force::CalibrationPair, force::Source};
@@ -162,7 +163,7 @@ impl Settings {
     /// ```
     pub fn state_exact(&mut self) {
         for Assumption { source, .. } in Assumption::ALL {
-            // Light is never even.
+            // Light is never perfectly even.
             let error = if source == Source::Gain { 1e-3 } else { 0.0 };
             if self.assumptions.stated(source).is_none() {
                 self.assumptions.state(source, error);
@@ -170,7 +171,7 @@ impl Settings {
         }
     }
 
-    /// Whether the error of a source is assumed.
+    /// Whether the error of a source is the default.
     pub(super) fn assumes(&self, source: Source) -> bool {
         let shown = match source {
             Source::Coupling => self.checked_gain.is_some(),
@@ -181,7 +182,7 @@ impl Settings {
         assumed && !shown && self.assumptions.stated(source).is_none()
     }
 
-    /// Relative error of the gain of the light, beside that of the calibration.
+    /// Relative error of the gain of the light, without that of the calibration.
     pub(super) fn coupling(&self) -> f64 {
         match self.checked_gain {
             Some(checked) => checked.gain.relative_error(),
@@ -189,14 +190,14 @@ impl Settings {
         }
     }
 
-    /// The covariance of the layers' parameters, stated or assumed.
+    /// The covariance of the layers' parameters, stated or default.
     pub(super) fn layer_covariance(&self) -> DMatrix<f64> {
         let layers = self
             .waveguide
             .as_ref()
             .map_or(0, |guide| guide.layers().len());
         self.layer_covariance.clone().unwrap_or_else(|| {
-            // One factor of all moduli, whose logarithms come first.
+            // A common factor of all moduli, whose logarithms come first.
             let variance = self.assumptions.error(Source::Guide).powi(2);
             let parameters = PARAMETERS_PER_LAYER * layers;
             DMatrix::from_fn(parameters, parameters, |i, j| match i.max(j) < layers {
@@ -206,11 +207,12 @@ impl Settings {
         })
     }
 
-    /// The object and the guide, with the errors that are stated or assumed of them.
+    /// The object and the guide, with their stated or default errors.
     pub(super) fn bodies(&self) -> Result<Bodies, ElasticityError> {
         let errors = &self.assumptions;
         let size_error = match (self.object.radius_m(), errors.stated(Source::ObjectSize)) {
-            // A block is not read by its size, nor is a cone assumed to be blunt.
+            // The estimator of a block does not use its size, and the tip of a cone has no default
+            // radius.
             (None, None) => 0.0,
             _ => errors.error(Source::ObjectSize),
         };
@@ -229,7 +231,7 @@ impl Settings {
         bodies.with_layer_errors(covariance.clone(), with_length.map(by_length))
     }
 
-    /// Refuses what has no meaning.
+    /// Rejects invalid settings.
     pub(super) fn check(&self) -> Result<(), PipelineError> {
         self.object.validated().map_err(PipelineError::Material)?;
         Requirement::Odd.check("smoothing_px", self.smoothing_px as f64)?;

@@ -1,4 +1,4 @@
-//! Where the frames of a stream come from.
+//! Sources of the frames of a stream.
 use ndarray::Array2;
 
 /// A source of frames of one size: a camera, a video, the simulator.
@@ -6,7 +6,7 @@ use ndarray::Array2;
 /// ```
 /// use ndarray::Array2;
 /// use tactile_imaging::pipeline::FrameSource;
-/// /// A camera that sees the same grey for ever.
+/// /// A camera that always sees the same grey.
 /// struct Grey(u64);
 /// impl FrameSource for Grey {
 ///     type Error = std::convert::Infallible;
@@ -21,13 +21,13 @@ use ndarray::Array2;
 /// # Ok::<(), std::convert::Infallible>(())
 /// ```
 pub trait FrameSource {
-    /// What can go wrong.
+    /// The error of the source.
     type Error: std::error::Error;
 
-    /// Writes the next frame into `frame` (of another size: replaces it) and returns its time in
-    /// seconds. `None` at the end.
+    /// Writes the next frame into `frame`, replacing it if the size differs, and returns its time
+    /// in seconds. `None` at the end.
     ///
     /// # Errors
-    /// What the source meets.
+    /// The error of the source.
     fn next_frame(&mut self, frame: &mut Array2<u8>) -> Result<Option<f64>, Self::Error>;
 }

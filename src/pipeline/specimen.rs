@@ -1,4 +1,4 @@
-//! The decision that follows from the pressed object: a curved specimen or one with a flat face.
+//! The kind of specimen: curved, or with a flat face.
 use super::contact::ContactReading;
 use super::error::PipelineError;
 use super::flag::Flag;
@@ -12,12 +12,12 @@ use crate::elasticity::strain::StrainMeasure;
 use crate::force::{FaceReading, ShapeProblem};
 use nalgebra::Matrix3;
 
-/// How an object is read, decided once where a press or a session begins.
+/// The kind of specimen, decided once at the start of a press or a session.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Specimen {
-    /// Strain is that of the surface reconstructed from the light.
+    /// Strain follows from the surface reconstructed from the light.
     Curved,
-    /// Strain is that of the face's area.
+    /// Strain follows from the area of the face.
     Flat(FlatSpecimen),
 }
 
@@ -42,13 +42,13 @@ impl Specimen {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FlatSpecimen {
     pub poisson_ratio: f64,
-    /// Whether the user has stated that its face is flat. The statement is believed as far as the
-    /// frame does not contradict it.
+    /// Whether the user stated that the face is flat. The statement is accepted unless the frame
+    /// contradicts it.
     pub stated: bool,
 }
 
 impl FlatSpecimen {
-    /// What hinders reading a contact as a flat face.
+    /// The contact as a flat face, or the reason why it cannot be one.
     fn face_of(self, contact: &ContactReading) -> Result<FaceReading, ShapeProblem> {
         if contact.touches_edge {
             return Err(ShapeProblem::Cut);
@@ -68,11 +68,11 @@ impl FlatSpecimen {
         Ok(face)
     }
 
-    /// Refuses contacts that are not those of one flat face under uniaxial load. `frame` numbers go
-    /// with the contacts.
+    /// Rejects contacts that are not those of one flat face under uniaxial load. The contacts come
+    /// with their frame numbers.
     ///
     /// # Errors
-    /// [`PipelineError::NotUniaxial`] of the first contact that is not.
+    /// [`PipelineError::NotUniaxial`] for the first contact that is not.
     pub(super) fn check<'a>(
         self,
         contacts: impl IntoIterator<Item = (usize, &'a ContactReading)>,
@@ -86,7 +86,7 @@ impl FlatSpecimen {
         Ok(())
     }
 
-    /// The strain between two loads: the same everywhere, from the growth of the face's area.
+    /// The strain between two loads, uniform and derived from the growth of the face's area.
     pub(super) fn strain(
         self,
         [from, to]: [usize; 2],
@@ -120,7 +120,7 @@ impl FlatSpecimen {
         })
     }
 
-    /// Loads whose areas are turned into strains since the unloaded state.
+    /// The loads, with areas converted to strains since the unloaded state.
     pub(super) fn strained(
         self,
         series: &LoadSeries,
@@ -131,16 +131,16 @@ impl FlatSpecimen {
     }
 }
 
-// Excess of the conjugate stress over E e from which a sample's law matters. With S = E (e + c e²)
-// the ratio S/e is off by c e and the slope of a line with an intercept of its own by up to twice
-// that: 5 %, the error that the paper reports.
+// Relative excess of the conjugate stress over E e at which the law of a sample matters. With S = E
+// (e + c e²), the ratio S/e is off by c e, and the slope of a line with a free intercept by up to
+// twice this: 5 %, the error that the paper reports.
 const LARGEST_EXCESS: f64 = 0.025;
 
-/// A caution where a rubber-like sample, squeezed to this strain of a measure, would give a ratio
-/// that is off by more than 2.5 %, or a slope by 5 %, or where the measure has no conjugate stress
-/// to judge it by.
+/// A caution if the ratio of a rubber-like sample at this strain would be off by more than 2.5 %,
+/// or a slope by 5 %. Also a caution if the measure has no conjugate stress, so that this cannot be
+/// assessed.
 pub(super) fn material_law(measure: &dyn StrainMeasure, strain: f64) -> Option<Flag> {
-    // Without a strain nothing is divided by it.
+    // Without strain there is no division by it.
     if strain == 0.0 || strain.is_nan() {
         return None;
     }
@@ -174,8 +174,8 @@ mod tests {
 
     #[test]
     fn the_excess_is_that_of_the_expansion() {
-        // S/e = E (1 − 5e/2 + …) for Green–Lagrange, E (1 + e/2 + …) for Hencky: the next terms are
-        // of some e².
+        // S/e = E (1 − 5e/2 + …) for Green–Lagrange and E (1 + e/2 + …) for Hencky. The next terms
+        // are of order e².
         for strain in [-0.03, -0.06] {
             let error = excess(&GreenLagrange, strain) + 2.5 * strain;
             assert!(error.abs() < 10.0 * strain * strain, "{error}");
@@ -184,7 +184,7 @@ mod tests {
         assert!(error.abs() < 0.12 * 0.12, "{error}");
     }
 
-    /// A measure of one's own: a factor of another one, or mixed across the axes.
+    /// A user-defined measure: a multiple of another one, or mixed across the axes.
     struct Own {
         across: f64,
     }

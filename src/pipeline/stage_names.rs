@@ -1,4 +1,4 @@
-//! The names of stages in configurations, and the stage behind every name.
+//! Names of stages in configurations, and the stage for each name.
 use super::error::PipelineError;
 use crate::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
@@ -16,7 +16,7 @@ use crate::tps::{AffineModel, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, W
 use std::fmt;
 use std::sync::Arc;
 
-/// A name that no stage of this kind has.
+/// A name that does not exist for this kind of stage.
 ///
 /// ```
 /// use tactile_imaging::pipeline::{ReconstructionChoice, UnknownStage};
@@ -29,13 +29,13 @@ use std::sync::Arc;
 pub struct UnknownStage {
     /// The stage.
     pub stage: &'static str,
-    /// The names that it knows.
+    /// The valid names.
     pub expected: &'static str,
     /// The name given.
     pub found: String,
 }
 
-/// An enum whose variants have names in configurations. The first is the default.
+/// An enum whose variants have names in configurations. The first variant is the default.
 macro_rules! choice {
     ($(#[$meta:meta])* $name:ident, $stage:literal:
         $(#[$one:meta])* $first:ident = $text:literal, $($(#[$more:meta])* $variant:ident = $other:literal),+ $(,)?) => {
@@ -52,12 +52,12 @@ macro_rules! choice {
         }
 
         impl $name {
-            /// All of them, the default first.
+            /// All variants, the default first.
             pub const ALL: &[Self] = &[Self::$first, $(Self::$variant),+];
-            /// The names, as a sentence says them.
+            /// The valid names as text.
             pub const EXPECTED: &str = concat!("one of \"", $text, "\"", $(", \"", $other, "\""),+);
 
-            /// The name in configurations. [`Display`](fmt::Display) writes it.
+            /// The name in configurations, as written by [`Display`](fmt::Display).
             pub(crate) fn name(self) -> &'static str {
                 match self { Self::$first => $text, $(Self::$variant => $other),+ }
             }
@@ -87,8 +87,8 @@ macro_rules! choice {
 }
 
 choice! {
-    /// Image to surface, under frontal light. Methods under another light go to
-    /// [`Pipeline::with_surface`](super::Pipeline::with_surface).
+    /// From an image to a surface, under frontal light. For other light use
+    ///  [`Pipeline::with_surface`](super::Pipeline::with_surface).
     ///
     /// ```
     /// use tactile_imaging::pipeline::ReconstructionChoice;
@@ -97,15 +97,15 @@ choice! {
     /// assert!(error.starts_with("stage `reconstruction` must be one of \"eikonal\""));
     /// ```
     ReconstructionChoice, "reconstruction":
-    /// [`Eikonal`](crate::sfs::Eikonal), zero height at the contour of the fitted profile.
+    /// [`Eikonal`](crate::sfs::Eikonal), with height zero at the contour of the fitted profile.
     Eikonal = "eikonal",
-    /// [`TsaiShah`](crate::sfs::TsaiShah): quick, and much too low on the fine frames of a whole
-    /// contact.
+    /// [`TsaiShah`](crate::sfs::TsaiShah): fast, but its heights are much too low on the fine
+    /// frames of a whole contact.
     TsaiShah = "tsai-shah",
 }
 
 choice! {
-    /// Surface to control points.
+    /// From a surface to control points.
     ///
     /// ```
     /// use tactile_imaging::pipeline::SamplerChoice;
@@ -120,19 +120,19 @@ choice! {
 }
 
 choice! {
-    /// Points to matches.
+    /// From points to matches.
     ///
     /// ```
     /// use tactile_imaging::pipeline::MatcherChoice;
     /// assert!(MatcherChoice::ALL.iter().all(|m| m.to_string().parse() == Ok(*m)));
     /// ```
     MatcherChoice, "matcher":
-    /// [`AnnealedSoftassign`](crate::matching::AnnealedSoftassign), searching near by.
+    /// [`AnnealedSoftassign`](crate::matching::AnnealedSoftassign), searching nearby.
     AnnealedSoftassign = "annealed-softassign",
     /// [`RelaxationLabelling`](crate::matching::RelaxationLabelling): the paper's method, with the
     /// factor γ of both edges.
     RelaxationLabelling = "relaxation-labelling",
-    /// The same with the γ of the model's edge alone, as (18) is printed.
+    /// Like `RelaxationLabelling`, with the γ of the model's edge alone, as printed in (18).
     PrintedLabelling = "printed-labelling",
     /// [`CoherentPointDrift`](crate::matching::CoherentPointDrift).
     CoherentPointDrift = "coherent-point-drift",
@@ -143,28 +143,28 @@ choice! {
 }
 
 choice! {
-    /// Matches to the warp whose gradient is strained.
+    /// From matches to the warp whose gradient gives the strain.
     ///
     /// ```
     /// use tactile_imaging::pipeline::WarpChoice;
     /// assert_eq!(WarpChoice::Affine.to_string(), "affine");
     /// ```
     WarpChoice, "warp":
-    /// [`AffineModel::General`](crate::tps::AffineModel::General): errors of reconstructed surfaces,
-    /// which neighbours share, pass for anything finer.
+    /// [`AffineModel::General`](crate::tps::AffineModel::General). A finer model would fit the
+    /// errors of reconstructed surfaces, which neighbouring points share.
     Affine = "affine",
-    /// The thin-plate spline in space, kernel −r, smoothed by generalised cross-validation.
+    /// The thin-plate spline in space with kernel −r, smoothed by generalised cross-validation.
     ThinPlateSpline = "thin-plate-spline",
-    /// The spline of kernel r³, smoothed by cross-validation.
+    /// The spline with kernel r³, smoothed by cross-validation.
     CubicSpline = "cubic-spline",
-    /// The interpolating spline of kernel r² log r, as (21) is printed.
+    /// The interpolating spline with kernel r² log r, as printed in (21).
     PrintedSpline = "printed-spline",
     /// [`AffineModel::Rigid`](crate::tps::AffineModel::Rigid).
     Rigid = "rigid",
 }
 
 choice! {
-    /// Displacement gradient to strain.
+    /// From a displacement gradient to strain.
     ///
     /// ```
     /// use tactile_imaging::pipeline::StrainChoice;
@@ -184,7 +184,7 @@ choice! {
 }
 
 choice! {
-    /// Loads to the modulus.
+    /// From loads to the modulus.
     ///
     /// ```
     /// use tactile_imaging::pipeline::EstimatorChoice;
@@ -192,9 +192,9 @@ choice! {
     /// assert_eq!(EstimatorChoice::default().to_string(), "best");
     /// ```
     EstimatorChoice, "estimator":
-    /// The default for the object:
-    /// [`SphereOnWaveguide`](crate::elasticity::modulus::SphereOnWaveguide) for a ball, on a rigid
-    /// flat where no layers are known, the law of its shape for a layer and a cone, else
+    /// The default for the object. For a ball it is
+    /// [`SphereOnWaveguide`](crate::elasticity::modulus::SphereOnWaveguide), on a rigid flat if no
+    /// layers are known. A layer and a cone have their own laws. For all others it is
     /// [`PaperRatio`](crate::elasticity::modulus::PaperRatio).
     Best = "best",
     /// [`PaperRatio`](crate::elasticity::modulus::PaperRatio): stress over strain, equation (31).
@@ -202,27 +202,27 @@ choice! {
     /// [`StressStrainRegression`](crate::elasticity::modulus::StressStrainRegression) over three
     /// loads or more.
     Regression = "regression",
-    /// [`HertzSphere`](crate::elasticity::modulus::HertzSphere), the waveguide's layers in series:
-    /// small contacts on deep layers. A ball alone.
+    /// [`HertzSphere`](crate::elasticity::modulus::HertzSphere) with the waveguide's layers in
+    /// series: for small contacts on deep layers, and only for a ball.
     Sphere = "sphere",
-    /// [`SphereOnWaveguide`](crate::elasticity::modulus::SphereOnWaveguide). A ball alone, on the
-    /// waveguide's layers or a rigid flat.
+    /// [`SphereOnWaveguide`](crate::elasticity::modulus::SphereOnWaveguide). Only for a ball, on
+    /// the waveguide's layers or a rigid flat.
     SphereOnWaveguide = "sphere-on-waveguide",
-    /// [`TabulatedContact`](crate::elasticity::modulus::TabulatedContact). A ball alone, and with a
+    /// [`TabulatedContact`](crate::elasticity::modulus::TabulatedContact). Only for a ball with a
     /// table of its contacts.
     TabulatedContact = "tabulated-contact",
-    /// [`BondedLayer`](crate::elasticity::modulus::BondedLayer) by its integral equation. A layer
-    /// alone.
+    /// [`BondedLayer`](crate::elasticity::modulus::BondedLayer) by its integral equation. Only for
+    /// a layer.
     BondedLayer = "bonded-layer",
-    /// [`Cone`](crate::elasticity::modulus::Cone). A cone alone, and from depths.
+    /// [`Cone`](crate::elasticity::modulus::Cone). Only for a cone, with depths.
     Cone = "cone",
-    /// [`FlatPunch`](crate::elasticity::modulus::FlatPunch). A flat-ended cylinder alone, and from
-    /// depths (a depth table's).
+    /// [`FlatPunch`](crate::elasticity::modulus::FlatPunch). Only for a flat-ended cylinder, with
+    /// depths (such as those of a depth table).
     FlatPunch = "flat-punch",
 }
 
-/// The default reconstruction: frontal light, height zero on the sub-pixel contour of the profile
-/// fitted to the contact.
+/// The default reconstruction: frontal light, and height zero on the sub-pixel contour of the
+/// fitted contact profile.
 pub(super) fn eikonal() -> Result<Eikonal<f64>, PipelineError> {
     Eikonal::new(Lighting::default())
         .with_boundary(BoundaryCondition::Height(0.0))
@@ -251,7 +251,8 @@ impl SamplerChoice {
     }
 }
 
-/// The default matcher. Two loads of one contact lie near each other: one run from where they are.
+/// The default matcher. Two loads of one contact are near each other, so one run from their
+/// positions is enough.
 pub(super) fn near_by() -> AnnealedSoftassign {
     AnnealedSoftassign::default().with_search(Search::Near)
 }
@@ -271,7 +272,7 @@ impl MatcherChoice {
     }
 }
 
-/// A spline as smooth as generalised cross-validation finds it.
+/// Options of a spline whose smoothing is chosen by generalised cross-validation.
 fn smooth<K: Kernel>(kernel: K) -> Result<FitOptions<K>, PipelineError> {
     let options = FitOptions::new(kernel).with_smoothing(Smoothing::Gcv);
     options.map_err(PipelineError::WarpOptions)
@@ -301,8 +302,8 @@ impl StrainChoice {
     }
 }
 
-/// Which stage to take for each step, by name. What is not said is the default. With the feature
-/// `serde` a table such as `reconstruction = "tsai-shah"` is one.
+/// The stage for each step, by name. Names that are not given keep their defaults. With the feature
+/// `serde` a table such as `reconstruction = "tsai-shah"` can be read.
 ///
 /// ```
 /// use tactile_imaging::pipeline::{MatcherChoice, StagesConfig, StrainChoice};
@@ -316,26 +317,26 @@ impl StrainChoice {
     serde(default, deny_unknown_fields)
 )]
 pub struct StagesConfig {
-    /// Image to surface.
+    /// From an image to a surface.
     pub reconstruction: ReconstructionChoice,
-    /// Surface to control points.
+    /// From a surface to control points.
     pub sampler: SamplerChoice,
-    /// Points to matches.
+    /// From points to matches.
     pub matcher: MatcherChoice,
-    /// Matches to a warp.
+    /// From matches to a warp.
     pub warp: WarpChoice,
-    /// Displacement gradient to strain.
+    /// From a displacement gradient to strain.
     pub strain: StrainChoice,
-    /// Loads to the modulus.
+    /// From loads to the modulus.
     pub estimator: EstimatorChoice,
 }
 
 impl StagesConfig {
-    /// The stages of the paper as printed: Tsai and Shah's surface, equally spaced control points,
-    /// labelling by (13)–(20), the spline of (21)–(24), Green–Lagrange strain, and the modulus of
-    /// (31).
+    /// The stages of the paper as printed: the surface of Tsai and Shah, equally spaced control
+    /// points, labelling by (13)–(20), the spline of (21)–(24), Green–Lagrange strain, and the
+    /// modulus of (31).
     ///
-    /// The labelling is dense: some seconds for 100 points, minutes for 200.
+    /// The labelling is dense: several seconds for 100 points, minutes for 200.
     ///
     /// ```
     /// use tactile_imaging::pipeline::{EstimatorChoice, StagesConfig};

@@ -1,5 +1,5 @@
-//! The stages as functions: values in, values out. A press keeps the answers, a session the memory
-//! they are written to.
+//! The stages as functions of values. A press keeps the results, a session the memory that they are
+//! written to.
 use super::contact::{ContactReading, ContactStage, FrameContact};
 use super::error::PipelineError;
 use super::flag::Flag;
@@ -24,18 +24,18 @@ use ndarray::ArrayView2;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Control points in a row that share the errors of a surface.
+/// Number of consecutive control points that share the errors of a surface.
 const NEIGHBOURS: usize = 10;
 
-/// What a press or a session asks its stages of: nothing in it changes.
+/// The stages and settings of a press or a session. They are constant.
 #[derive(Clone)]
 pub(super) struct Stages {
     pub pipeline: Pipeline,
     pub reference: Arc<ReferenceFrame>,
     pub specimen: Specimen,
-    /// Since the calibration, where its light is known.
+    /// Change of the light since the calibration, if its light is known.
     pub light: Option<LightChange>,
-    /// The contact stage, or the variant that it has for flat faces.
+    /// The contact stage, or its variant for flat faces.
     contact: Arc<dyn ContactStage>,
 }
 
@@ -50,7 +50,7 @@ pub(super) struct Scratch {
 }
 
 impl Scratch {
-    /// The answer of a stage, its time recorded.
+    /// Runs a stage and records its time.
     pub(super) fn timed<T>(&mut self, stage: Stage, run: impl FnOnce(&mut Self) -> T) -> T {
         let start = Instant::now();
         let answer = run(self);
@@ -79,8 +79,8 @@ impl Stages {
         }
     }
 
-    /// Contact and force of a frame, into `contact`. A force that the stage does not know is the
-    /// gauge's.
+    /// Writes contact and force of a frame into `contact`. If the stage gives no force, the gauge's
+    /// is used.
     pub(super) fn contact(
         &self,
         scratch: &mut Scratch,
@@ -99,8 +99,8 @@ impl Stages {
                 && let Some(bounds) = contact.bounds()
             {
                 let step = median_shift_outside(image, self.reference.image(), bounds);
-                // A twentieth of a grey level is half a per cent of a dim background, and five
-                // standard errors are noise once in a million frames.
+                // A twentieth of a grey level is half a per cent of a dim background, and noise
+                // exceeds five standard errors once in a million frames.
                 let limit = |step: Estimate| 0.05_f64.max(5.0 * step.standard_error);
                 let beyond = |step: Estimate| match step.value.abs() > limit(step) {
                     true => step.value,
@@ -122,7 +122,7 @@ impl Stages {
                     Some(_) => self.of_light(),
                     None => Uncertain::exact(1.0),
                 };
-                // Above its level of saturation a Hertz profile has less than this share of its
+                // Above its saturation level a Hertz profile has less than this fraction of its
                 // force.
                 let factor = factor
                     .by_relative(Source::Gain, settings.assumptions.error(Source::Gain))
@@ -148,8 +148,8 @@ impl Stages {
         Ok(())
     }
 
-    /// By what a force that is read from light is multiplied: light that is brighter than that of
-    /// the calibration, and what presses of known force show.
+    /// The factor for a force read from light: it corrects for light brighter than at the
+    /// calibration and for the gain by presses of known force.
     fn of_light(&self) -> Uncertain {
         let settings = self.pipeline.settings();
         let mut factor = match settings.checked_gain {
@@ -158,7 +158,7 @@ impl Stages {
         };
         if let Some(light) = self.light {
             factor = factor * light.gain.value.recip();
-            // Presses of known force were read by the same light.
+            // Presses of known force used the same light.
             if settings.checked_gain.is_none() {
                 factor = factor.by_relative(Source::Gain, light.gain.relative_error());
             }
@@ -166,17 +166,18 @@ impl Stages {
         factor
     }
 
-    /// Whether the object is said to be a ball. What is said to be none need not look like one.
+    /// Whether the object may be a ball. An object stated to have another shape need not look like
+    /// one.
     fn is_ball(&self) -> bool {
         let object = self.pipeline.settings().object;
         matches!(object, Object::Sphere { .. } | Object::Layer { .. })
     }
 
-    /// The relative error of lengths in a contact that does not look like the object.
+    /// The relative error of lengths if a contact does not look like the object.
     fn shape_doubt(&self, reading: &ContactReading) -> f64 {
         match self.other_punch(reading) {
             _ if self.is_ball() => reading.shape_doubt(),
-            // An error of twice a length is one that cannot be told.
+            // An error of twice a length marks the length as undetermined.
             Some(punch_m) => (reading.contact_radius_m.value / punch_m)
                 .ln()
                 .abs()
@@ -185,7 +186,7 @@ impl Stages {
         }
     }
 
-    /// The radius of the punch that the object is said to be, where the contact has another one.
+    /// The radius of the stated punch, if the contact has another one.
     fn other_punch(&self, reading: &ContactReading) -> Option<f64> {
         let Object::FlatPunch { radius_m, .. } = self.pipeline.settings().object else {
             return None;
@@ -196,8 +197,8 @@ impl Stages {
         (ratio.ln().abs() > 0.1).then_some(radius_m)
     }
 
-    /// The cautions about a frame: about its contact, the light around it, the gauge's reading of
-    /// its force, or why it may have no contact.
+    /// The cautions about a frame: about its contact, the surrounding light, the gauge reading of
+    /// its force, or the reason why it may have no contact.
     pub(super) fn cautions(
         &self,
         frame: usize,
@@ -211,7 +212,7 @@ impl Stages {
             let shift = background_shift(image, reference);
             let caution = shift.map(|grey| match grey * sign < 0.0 {
                 true => Flag::OppositeSignal { frame, grey },
-                // The light that was corrected, or a contact too faint or small to be one.
+                // The light that was corrected, or a contact too faint or too small to be detected.
                 false => Flag::LightDrifted { grey },
             });
             return caution.into_iter().collect();
@@ -244,7 +245,8 @@ impl Stages {
         if let (Some(gauge), Some(force_n)) = (gauge, reading.force_n) {
             let (gauge_n, measured_n) = (gauge.value, force_n.value);
             let apart = (gauge_n - measured_n).abs();
-            // What the object couples is what a gauge shows: its error excuses no difference.
+            // A gauge reveals the coupling of the object, so the coupling error must not excuse a
+            // difference.
             let error_n = force_n.without(Source::Coupling).standard_error();
             if apart > 3.0 * error_n && apart > 0.02 * gauge_n {
                 flags.push(Flag::GaugeDisagrees {
@@ -259,7 +261,7 @@ impl Stages {
         flags
     }
 
-    /// A contact as a flat face.
+    /// The contact as a flat face.
     fn face(
         &self,
         workspace: &mut FaceWorkspace,
@@ -271,7 +273,7 @@ impl Stages {
         let (polarity, size) = (self.contact.polarity(), self.contact.pixel_size_m());
         let mut face = workspace.measure(images, region, contact.mask.view(), polarity, size)?;
         if let Some(lens) = self.contact.lens() {
-            // Pixels of a lens that distorts differ in size.
+            // With a distorting lens the pixels differ in size.
             let pixel_m2 = size[0] * size[1];
             let place = reading.centroid_px.map(|c| c.value);
             let radius_px = (face.area_m2.value / (std::f64::consts::PI * pixel_m2)).sqrt();
@@ -281,8 +283,8 @@ impl Stages {
         Some(face)
     }
 
-    /// The surface of a contact, into `surface`. All surfaces that are compared have one grid, so
-    /// that the grid leaves no strain: that of a contact of `grid_pixels` pixels.
+    /// Reconstructs the surface of a contact in `surface`. All compared surfaces use the grid of a
+    /// contact of `grid_pixels` pixels, so that the grid does not contribute to the strain.
     pub(super) fn surface(
         &self,
         scratch: &mut Scratch,
@@ -307,7 +309,7 @@ impl Stages {
         })
     }
 
-    /// The control points of a surface, into `points`.
+    /// Writes the control points of a surface into `points`.
     pub(super) fn control_points(
         &self,
         scratch: &mut Scratch,
@@ -335,7 +337,7 @@ impl Stages {
             .map_err(|source| PipelineError::Match { from, to, source })
     }
 
-    /// The pairs of a match that begins where the last one ended, into `pairs`.
+    /// Writes the pairs of a match that starts from the last answer into `pairs`.
     pub(super) fn next_pairs(
         &self,
         scratch: &mut Scratch,
@@ -353,7 +355,8 @@ impl Stages {
             .map_err(|source| PipelineError::Match { from, to, source })
     }
 
-    /// The strain between two frames from the matches of their control points, into `strain`.
+    /// Writes the strain between two frames, from the matches of their control points, into
+    /// `strain`.
     pub(super) fn strain(
         &self,
         scratch: &mut Scratch,
@@ -368,7 +371,7 @@ impl Stages {
         })
     }
 
-    /// Young's modulus. An estimate that fails is timed too: it has looked at the data.
+    /// Young's modulus. The time of a failed estimate is recorded too.
     pub(super) fn modulus(
         &self,
         scratch: &mut Scratch,
@@ -376,7 +379,7 @@ impl Stages {
         loads: &LoadSeries,
     ) -> Result<ModulusEstimate, PipelineError> {
         let read = |load: &LoadState| load.contact_radius_m.is_some();
-        // A flat face is read by its area, not by a radius.
+        // A flat face is measured by its area, not by a radius.
         let curved = !matches!(self.specimen, Specimen::Flat(_));
         if curved && !loads.loads().is_empty() && !loads.loads().iter().any(read) {
             return Err(PipelineError::NoWholeContact);
@@ -389,13 +392,13 @@ impl Stages {
         Ok(estimate)
     }
 
-    /// Warnings about what can be, but is more often a slip of a unit or a name.
+    /// Warnings about values that are possible but more often come from a wrong unit or name.
     fn likely_slips(&self, modulus_pa: f64) -> impl Iterator<Item = Warning> {
         let settings = self.pipeline.settings();
         let layers = settings.waveguide.iter().flat_map(|guide| guide.layers());
         let moduli = layers.map(|layer| layer.youngs_modulus_pa);
         let ratios = moduli.map(|layer_pa| modulus_pa / layer_pa);
-        // The ratio to the layer that is most like the sample.
+        // The ratio to the layer whose modulus is closest to that of the sample.
         let ratio = ratios.min_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs()));
         let unlike = ratio.filter(|ratio| ratio.ln().abs() > Warning::UNLIKE_GUIDE.ln());
         let unlike = unlike.map(|ratio| Warning::UnlikeGuide { ratio });
@@ -411,12 +414,12 @@ impl Stages {
 pub(super) struct MatchedPoints<'a> {
     pub model: &'a ControlPoints,
     pub target: &'a [Point3<f64>],
-    /// For every point of the model.
+    /// Partner of each point of the model.
     pub assignment: &'a [Option<usize>],
     pub confidence: &'a [f64],
 }
 
-/// Memory of the strain stage.
+/// Working memory of the strain stage.
 #[derive(Default)]
 struct StrainWorkspace {
     warp: SeriesMemory,
@@ -427,7 +430,7 @@ struct StrainWorkspace {
 }
 
 impl StrainWorkspace {
-    /// Takes the pairs of a match.
+    /// Stores the pairs of a match.
     fn take(&mut self, matched: &MatchedPoints<'_>) {
         self.sources.clear();
         self.targets.clear();
@@ -446,9 +449,9 @@ impl StrainWorkspace {
     /// Strain, at the first frame's control points, of the warp through the matches, weighted by
     /// their confidence.
     ///
-    /// The matcher's own warp follows every point. Its gradient across a surface, where no two
-    /// points lie behind each other, would be noise. The default here is affine: errors of
-    /// reconstructed surfaces, which neighbours share, pass for anything finer.
+    /// The matcher's own warp follows every point. Its gradient normal to the surface, where no two
+    /// points lie behind each other, would be noise. The default warp here is affine, because a
+    /// finer one would fit the errors of reconstructed surfaces, which neighbouring points share.
     fn strain(
         &mut self,
         pipeline: &Pipeline,
@@ -497,8 +500,8 @@ impl StrainWorkspace {
         );
         let errors = &mut strain.summary.standard_error;
         errors.zip_apply(&noise, |error, noise| *error = error.hypot(noise));
-        // Across the surface the strain is that of its height, ½ (h₂²/h₁² − 1), whose error both
-        // loads have in common but for half a cell of the grid.
+        // Normal to the surface the strain follows from the height: ½ (h₂²/h₁² − 1). Its error is
+        // common to both loads apart from half a cell of the grid.
         let height = |points: &[Point3<f64>]| points.iter().fold(0.0, |h: f64, p| h.max(p.z));
         let [first, last] = [model.as_slice(), matched.target].map(height);
         let half_cell = 0.5 * matched.model.grid_m;

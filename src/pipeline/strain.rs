@@ -21,14 +21,14 @@ use crate::elasticity::modulus::Estimate;
 pub struct PairStrain {
     /// Name of the measure.
     pub measure: &'static str,
-    /// Strain at every control point of the first frame.
+    /// Strain at each control point of the first frame.
     pub field: StrainField,
     /// Mean, spread and standard error.
     pub summary: StrainSummary,
 }
 
 impl Default for PairStrain {
-    /// No strain yet, to be filled.
+    /// An empty value to be filled.
     fn default() -> Self {
         let field = StrainField::default();
         Self {
@@ -40,9 +40,9 @@ impl Default for PairStrain {
 }
 
 impl PairStrain {
-    /// The apparent strain of a ball's load for equation (31). The surface that its pressure is
-    /// read as swells where the load rises, in all directions, so that (31) takes the size of the
-    /// mean e_zz, with the sign of `force_step_n`, the step of the load from the first frame to the
+    /// The apparent strain of a ball's load for equation (31). The surface interpreted from its
+    /// pressure grows in all directions with the load. Equation (31) therefore gets the size of the
+    /// mean e_zz, with the sign of `force_step_n`, the change of load from the first frame to the
     /// second. (Specimens with a flat face have signed strains.)
     pub(super) fn of_load(&self, force_step_n: f64) -> Estimate {
         let size = self.summary.mean[(2, 2)].abs();

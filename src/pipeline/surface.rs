@@ -1,4 +1,4 @@
-//! From a frame's contact to its surface and the control points on it.
+//! From a frame's contact to its surface and control points.
 use super::contact::FrameContact;
 use super::pipeline::Pipeline;
 use super::settings::{Settings, SurfaceInput};
@@ -7,12 +7,12 @@ use crate::sfs::{self, BallFit, BinnedContact, Domain, Frame, Image, SfsError, S
 use nalgebra::Point3;
 use ndarray::ArrayView2;
 
-/// A reconstructed surface and its place in the frame.
+/// A reconstructed surface with its position in the frame.
 ///
 /// ```
 /// use ndarray::Array2;
 /// use tactile_imaging::pipeline::{DarkContact, Object, Pipeline, SurfaceInput};
-/// // A grey level is 5 µm, a pixel 0.1 mm; a ball of 4 mm radius lies 0.8 mm deep around pixel
+/// // A grey level is 5 µm, a pixel 0.1 mm; a ball of 4 mm radius is 0.8 mm deep around pixel
 /// // (32, 32).
 /// let table = [(0.0, 0.0), (200.0, 1e-3)];
 /// let depth_mm = |x: f64, y: f64| (16.0 - 0.01 * (x * x + y * y)).sqrt() - 3.2;
@@ -37,20 +37,20 @@ pub struct ContactSurface {
     pub surface: Surface<f64>,
     /// The box, in pixels of the frame.
     pub region: BoundingBox,
-    /// Frame pixels along the side of one of the grid's pixels.
+    /// Frame pixels along the side of a pixel of the grid.
     pub binning: usize,
-    /// The size of one of the grid's pixels in metres, x and y.
+    /// Size of a pixel of the grid in metres, x and y.
     pub pixel_size_m: [f64; 2],
-    /// Position (x, y) in metres of the grid's first pixel: from the middle of the frame's first
-    /// pixel to that of the block.
+    /// Position (x, y) in metres of the centre of the grid's first pixel, from the centre of the
+    /// frame's first pixel.
     pub origin_m: [f64; 2],
-    /// Whether the surface is *apparent*: the pressure, read as shading. The face of the sensor has
-    /// another shape.
+    /// Whether the surface is *apparent*: the pressure interpreted as shading. The face of the
+    /// sensor has another shape.
     pub apparent: bool,
 }
 
 impl Default for ContactSurface {
-    /// No surface yet, to be filled.
+    /// An empty value to be filled.
     fn default() -> Self {
         Self {
             surface: Surface::default(),
@@ -64,15 +64,15 @@ impl Default for ContactSurface {
 }
 
 impl ContactSurface {
-    /// Fits a ball of radius `radius_m`, its centre in metres from the frame's first pixel.
+    /// Fits a ball of radius `radius_m`. Its centre is in metres from the frame's first pixel.
     ///
-    /// `None` where the surface has fewer than 16 pixels, is wider than the ball, or no cap fits.
+    /// `None` if the surface has fewer than 16 pixels, is wider than the ball, or no cap fits.
     pub fn fit_ball(&self, radius_m: f64) -> Option<BallFit> {
         self.fit(|heights, domain| BallFit::of_radius(heights, domain, radius_m))
     }
 
-    /// Fits a ball of the radius with the least mean absolute error. `None` as for
-    /// [`fit_ball`](Self::fit_ball).
+    /// Fits a ball, with the radius of the smallest mean absolute error. `None` as for
+    ///  [`fit_ball`](Self::fit_ball).
     pub fn fit_any_ball(&self) -> Option<BallFit> {
         self.fit(BallFit::of_any_radius)
     }
@@ -91,8 +91,8 @@ impl ContactSurface {
     }
 }
 
-/// The box that whole blocks make of a contact's box: grown to the right and downwards, cut at the
-/// frame's end.
+/// The box of whole blocks that covers a contact's box: extended to the right and downwards, and
+/// cut at the end of the frame.
 fn whole_blocks(region: BoundingBox, side: usize, (rows, columns): (usize, usize)) -> BoundingBox {
     let end = |start: usize, end: usize, limit: usize| {
         let blocks = (end - start).div_ceil(side).min((limit - start) / side);
@@ -119,7 +119,7 @@ fn origin_m(region: &BoundingBox, binning: usize, pixel_size_m: [f64; 2]) -> [f6
     ]
 }
 
-/// Memory of the surface stage.
+/// Working memory of the surface stage.
 #[derive(Debug, Default)]
 pub(super) struct ContactSurfaceWorkspace {
     sfs: sfs::SurfaceWorkspace<f64>,
@@ -127,8 +127,8 @@ pub(super) struct ContactSurfaceWorkspace {
 }
 
 impl ContactSurfaceWorkspace {
-    /// The signal and the mask on the grid. Returns the grid's box. With a curve the signal is the
-    /// pressure over its peak.
+    /// Computes signal and mask on the grid. Returns the box of the grid. With a pressure curve the
+    /// signal is the pressure relative to its peak.
     fn load(
         &mut self,
         settings: &Settings,
@@ -141,7 +141,7 @@ impl ContactSurfaceWorkspace {
         let whole = whole_blocks(region, side, frame.dim());
         let images = [whole.of(frame), whole.of(reference)];
         self.grid.load(images, side, scale);
-        // A step of one level may be rounding.
+        // A change of one level may be rounding.
         let step = contact.background_step_grey.unwrap_or(0.0);
         if settings.surface_input == SurfaceInput::Signal && step.abs() > 1.0 {
             self.grid.signal.mapv_inplace(|v| v - scale * step);
@@ -155,7 +155,7 @@ impl ContactSurfaceWorkspace {
             self.grid.trim_rim();
         }
         let ceiling = ceiling(settings.surface_input);
-        // The width is that in the frame: a block has smoothed already.
+        // The width is that in the frame, because blocks already smooth.
         let width = (settings.smoothing_px / side) | 1;
         self.grid.smooth(width, |level| levelness(level / ceiling));
         self.grid.signal.mapv_inplace(|v| v.clamp(0.0, ceiling));
@@ -163,7 +163,7 @@ impl ContactSurfaceWorkspace {
     }
 }
 
-/// Greatest value of the input.
+/// Largest value of the input.
 fn ceiling(input: SurfaceInput) -> f64 {
     match input {
         SurfaceInput::Shading => 1.0,
@@ -171,12 +171,12 @@ fn ceiling(input: SurfaceInput) -> f64 {
     }
 }
 
-/// Blocks around a contact that its surface depends on, beside those that smoothing brings in: a
-/// ring of up to three on which the profile is continued, and one of known height.
+/// Blocks around a contact on which its surface depends, in addition to those reached by smoothing:
+/// a ring of up to three over which the profile is extrapolated, and one of known height.
 const AROUND: usize = 4;
 
-/// The part of a contact's region that its surface depends on, with the same blocks: detection
-/// looks far around a contact. Two passes of the smoothing reach as far as its width.
+/// The part of a contact's region on which its surface depends, in the same blocks, because
+/// detection uses a wide margin. Two passes of the smoothing reach as far as its width.
 fn trimmed(
     region: BoundingBox,
     contact: BoundingBox,
@@ -196,7 +196,7 @@ fn trimmed(
     }
 }
 
-/// A contact's mask over a part of its region.
+/// A contact's mask on a part of its region.
 fn mask_over(contact: &FrameContact, part: BoundingBox) -> ArrayView2<'_, bool> {
     let whole = contact.region.unwrap_or(part);
     let within = BoundingBox {
@@ -208,8 +208,7 @@ fn mask_over(contact: &FrameContact, part: BoundingBox) -> ArrayView2<'_, bool> 
     within.of(contact.mask.view())
 }
 
-/// Reconstructs the surface of a contact on a grid as fine as a contact of `pixels` pixels asks
-/// for.
+/// Reconstructs the surface of a contact on the grid that suits a contact of `pixels` pixels.
 pub(super) fn reconstruct(
     pipeline: &Pipeline,
     workspace: &mut ContactSurfaceWorkspace,
@@ -256,9 +255,9 @@ pub(super) fn reconstruct(
 /// Control points on a surface.
 #[derive(Debug, Default)]
 pub(super) struct ControlPoints {
-    /// In metres from the frame's first pixel.
+    /// Points in metres from the frame's first pixel.
     pub points: Vec<Point3<f64>>,
-    /// The longer side of the surface's pixel in metres.
+    /// The longer side of a surface pixel in metres.
     pub grid_m: f64,
 }
 
@@ -290,8 +289,8 @@ pub(super) fn sample(
     Ok(())
 }
 
-/// A point of a surface that was made as if all pixels were of the size at the centre of
-/// distortion. Its height grows as the pixels around it do.
+/// Undistorts a point of a surface that was computed as if all pixels had the size at the centre of
+/// distortion. Its height scales with the local pixel size.
 fn undistorted(lens: &LensGeometry, p: Point3<f64>) -> Point3<f64> {
     let [hx, hy] = lens.pixel_size_m();
     let pixel = [p.x / hx, p.y / hy];
@@ -300,8 +299,8 @@ fn undistorted(lens: &LensGeometry, p: Point3<f64>) -> Point3<f64> {
     Point3::new(x, y, p.z * growth)
 }
 
-/// How far a pixel is to be smoothed: not at all on slopes above 60°, where smoothing would round
-/// off the rim and noise does little harm, wholly on slopes below 37°.
+/// Weight of smoothing at a pixel: zero on slopes above 60°, where smoothing would round off the
+/// rim and noise does little harm, and one on slopes below 37°.
 fn levelness(shading: f64) -> f64 {
     ((shading - 0.5) / 0.3).clamp(0.0, 1.0)
 }
@@ -319,7 +318,7 @@ mod tests {
             column_end: 9,
         };
         let region = whole_blocks(contact, 3, (9, 11));
-        // Two blocks down to the frame's end, three across.
+        // Two blocks down to the end of the frame, three across.
         assert_eq!((region.row_end, region.column_end), (7, 11));
     }
 
@@ -343,7 +342,7 @@ mod tests {
             assert_eq!((part.row_start - region.row_start) % side, 0);
             assert!(part.row_start + margin <= 95 && part.row_start + margin + side > 95);
             assert_eq!(part.row_end, 120 + margin);
-            // No further than the region goes.
+            // No further than the region.
             assert_eq!(
                 (part.column_start, part.column_end),
                 (0, 90.min(70 + margin))

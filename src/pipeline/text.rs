@@ -1,8 +1,8 @@
-//! How numbers and results are printed and written.
+//! Formatting of numbers and results.
 use crate::core::Estimate;
 
-/// A value with its standard error, scaled to a unit: two significant digits of the error decide
-/// the decimals. An error of zero, or beyond the twelfth decimal, is not printed.
+/// Formats a value with its standard error, scaled to a unit. Two significant digits of the error
+/// determine the decimals. An error of zero, or beyond the twelfth decimal, is not printed.
 ///
 /// ```
 /// use tactile_imaging::pipeline::with_error;
@@ -19,8 +19,8 @@ pub fn with_error(value: f64, error: f64, scale: f64) -> String {
     }
 }
 
-/// The ends of an interval, scaled to a unit, in the digits of the standard error: `98.6 to 106.0`,
-/// or `above 98.6` without an upper end.
+/// Formats the ends of an interval, scaled to a unit, with the digits of the standard error:
+/// `98.6 to 106.0`, or `above 98.6` without an upper end.
 ///
 /// ```
 /// use tactile_imaging::pipeline::interval_text;
@@ -36,14 +36,14 @@ pub fn interval_text(ends: (f64, Option<f64>), error: f64, scale: f64) -> String
     }
 }
 
-/// Decimals that show two significant digits of an error. `None` of an error that is not known, and
-/// of one beyond the twelfth decimal, which is rounding.
+/// Decimals that show two significant digits of an error. `None` if the error is unknown or beyond
+/// the twelfth decimal, where it is rounding.
 pub(super) fn decimals_of(error: f64) -> Option<usize> {
     let decimals = (1.0 - error.log10().floor()).max(0.0) as usize;
     (error > 0.0 && error.is_finite() && decimals <= 12).then_some(decimals)
 }
 
-/// A number with this number of decimals. Zero has no sign.
+/// Formats a number with this number of decimals. Zero has no sign.
 pub(super) fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let is_zero = text.bytes().all(|c| matches!(c, b'-' | b'.' | b'0'));
@@ -54,12 +54,12 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// An estimate with its standard error, scaled to a unit.
+/// Formats an estimate with its standard error, scaled to a unit.
 pub(super) fn with_its_error(e: Estimate, scale: f64) -> String {
     with_error(e.value, e.standard_error, scale)
 }
 
-/// How results that may be missing are written: as they are, or `{"error": "…"}`.
+/// Serialises results that may be missing: the value, or `{"error": "…"}`.
 #[cfg(feature = "serde")]
 pub(super) mod outcome {
     use serde::{Serialize, Serializer};
@@ -97,7 +97,7 @@ pub(super) mod outcome {
         serializer.collect_seq(results.iter().map(Outcome::from))
     }
 
-    /// What has a name or a sentence, as that.
+    /// Serialises a value by its name or message.
     pub(crate) fn text<S: Serializer>(
         value: &impl Display,
         serializer: S,

@@ -1,11 +1,11 @@
-//! Whether the modulus changes over the time of a press.
+//! Change of the modulus over the time of a press.
 use super::text::{decimals_of, fixed, interval_text, with_error};
 use crate::core::Source;
 use crate::elasticity::modulus::{Estimate, Interval, LoadSeries, ModulusEstimator};
 use crate::elasticity::relaxation::{TimeDependence, TimedModulus, time_dependence};
 use std::fmt::{self, Display, Formatter};
 
-/// The time that a modulus is of, and whether it changed meanwhile.
+/// The time range of a modulus, and its change in that range.
 ///
 /// ```
 /// use tactile_imaging::elasticity::relaxation::TimeDependence;
@@ -28,11 +28,11 @@ use std::fmt::{self, Display, Formatter};
 pub struct TimeResult {
     /// Time of the first load that has a modulus, in seconds since the object touched.
     pub from_s: f64,
-    /// Time of the last.
+    /// Time of the last load that has a modulus.
     pub to_s: f64,
-    /// How many loads have a time and a modulus.
+    /// Number of loads with a time and a modulus.
     pub loads: usize,
-    /// What their moduli say of it.
+    /// The change of their moduli.
     pub change: TimeDependence,
 }
 
@@ -70,7 +70,7 @@ impl Display for TimeResult {
             }
             TimeDependence::Drifts { per_s } => write!(
                 f,
-                "the sensor's gain rises by {} % a second",
+                "the sensor's gain rises by {} % per second",
                 with_error(per_s.value, per_s.standard_error, 100.0)
             ),
             TimeDependence::Undecided { change } => write!(
@@ -85,18 +85,18 @@ impl Display for TimeResult {
     }
 }
 
-/// A value with its unit and its 95 % interval.
+/// Formats a value with its unit and its 95 % interval.
 fn within(value: f64, interval: Interval, scale: f64, unit: &str) -> String {
-    // The digits are those of a quarter of its width, as of a normal error. The error itself is not
-    // known, so that none is printed.
+    // The digits are those of a quarter of the interval's width, as for a normal distribution. The
+    // standard error is unknown and therefore not printed.
     let digits_of = interval.upper.map_or(value, |upper| upper - interval.lower) / 4.0;
     let ends = interval_text((interval.lower, interval.upper), digits_of, scale);
     let value = fixed(value * scale, decimals_of(digits_of * scale).unwrap_or(4));
     format!("{value} {unit} (95 %: {ends})")
 }
 
-/// What the moduli of single loads say of time. `times_s` has a place for each load. What has no
-/// time or alone gives no modulus is left out, and None is returned where fewer than two are left.
+/// Time dependence of the moduli of single loads. `times_s` has an entry for each load. Loads
+/// without a time or without a modulus of their own are skipped. `None` if fewer than two remain.
 pub(super) fn of_moduli(
     estimator: &dyn ModulusEstimator,
     series: &LoadSeries,
@@ -108,7 +108,7 @@ pub(super) fn of_moduli(
         let Some(time_s) = *time_s else {
             continue;
         };
-        // What the load alone says: its noise, and what is common to all loads.
+        // Errors of this load: its own noise and the common part.
         let alone = series.with_loads([*load]);
         let Ok(modulus_pa) = estimator.estimate(&alone).map(|found| found.by_source) else {
             continue;
@@ -129,7 +129,7 @@ pub(super) fn of_moduli(
     result(&moduli, scale_error, law_error)
 }
 
-/// What forces by the light over those by a gauge say of the sensor's gain.
+/// Time dependence of the sensor's gain: forces by the light over those by a gauge.
 pub(super) fn of_gains(forces: &[(f64, Estimate, Estimate)]) -> Option<TimeResult> {
     let ratios: Vec<TimedModulus> = (forces.iter())
         .map(|&(time_s, light, gauge)| {
@@ -139,7 +139,7 @@ pub(super) fn of_gains(forces: &[(f64, Estimate, Estimate)]) -> Option<TimeResul
             TimedModulus {
                 time_s,
                 force_n: gauge.value,
-                // In place of a modulus: the gain multiplies it.
+                // The ratio takes the place of a modulus, which is proportional to the gain.
                 youngs_modulus_pa: Estimate::new(ratio, error),
             }
         })

@@ -1,14 +1,14 @@
-//! The gain of the sensor as it is on the day, from forces that are read and known.
+//! The current gain of the sensor, from measured and known forces.
 use super::{CheckedObject, is_positive};
 use crate::core::Estimate;
 use crate::core::statistics::quantile_95;
 use crate::pipeline::assumptions::CheckedGain;
 use crate::pipeline::contact::ContactReading;
 
-/// A force that was read, beside the one that is known.
+/// A measured force with the known force.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GainCheck {
-    /// With the error that is this press' own.
+    /// Measured force. Its error is the part specific to this press.
     measured_n: Estimate,
     known_n: Estimate,
     object: CheckedObject,
@@ -22,7 +22,7 @@ impl GainCheck {
     ) -> Result<Self, &'static str> {
         let measured_n = contact
             .force_n
-            .ok_or("its force is not read from light")?
+            .ok_or("its force is not measured by light")?
             .total();
         let check = Self {
             measured_n,
@@ -33,12 +33,12 @@ impl GainCheck {
             return Err("its light is outside the calibration");
         }
         if !check.is_plausible() {
-            return Err("the force that is read is not half to twice the one that is known");
+            return Err("the measured force is not within half to twice the known one");
         }
         Ok(check)
     }
 
-    /// A gain below a half or above two is a wrong unit, rather than a sensor.
+    /// A gain below a half or above two indicates a wrong unit, not a sensor change.
     fn is_plausible(&self) -> bool {
         is_positive(self.measured_n) && self.log_gain().0.abs() < std::f64::consts::LN_2
     }
@@ -54,20 +54,20 @@ impl GainCheck {
     }
 }
 
-/// The gain of presses in any order.
+/// The gain from presses in any order.
 ///
-/// With x = ln(measured/known) of each press and its variance v: where presses of one object
-/// scatter by more than v explains, the drift's variance τ² is that of DerSimonian and Laird
-/// (1986, Control. Clin. Trials 7, 177), and the gain of the frames drifts by as much again.
-/// Of a sensor that drifts by 2 %, two presses let 88 of 100 intervals hold, and four 92.
-/// The calibrator lacks the object's own coupling: its mean has the variance
-/// `coupling_error`² besides. The means of both objects are weighted by their variances.
+/// With x = ln(measured/known) of each press and its variance v: if presses of one object scatter
+/// more than v explains, the drift's variance τ² is estimated as by DerSimonian and Laird (1986,
+/// Control. Clin. Trials 7, 177), and the gain of the frames varies by τ² again. For a sensor that
+/// drifts by 2 %, the coverage of the 95 % intervals is 88 % with two presses and 92 % with four.
+/// The calibrator lacks the coupling of the object: its mean gets the additional variance
+/// `coupling_error`². The means of both objects are weighted by their inverse variances.
 pub(super) fn checked(checks: &[GainCheck], coupling_error: f64) -> CheckedGain {
     let groups = [CheckedObject::Sample, CheckedObject::Calibrator].map(|object| {
         let of_object = checks.iter().filter(move |check| check.object == object);
         of_object
             .map(GainCheck::log_gain)
-            // No force is known to a part in a million.
+            // No force is known to one part in a million.
             .map(|(x, variance)| (x, variance.max(1e-12)))
             .collect::<Vec<_>>()
     });
@@ -95,8 +95,8 @@ pub(super) fn checked(checks: &[GainCheck], coupling_error: f64) -> CheckedGain 
     }
 }
 
-/// Standard deviation of the gain between a press and the frames that is assumed where the presses
-/// show none: lamps warm up. It widens forces by 0.1 to 0.2 % beside a weight known to 1 %.
+/// Default standard deviation of the gain between a press and the frames, used if the presses show
+/// no drift: lamps warm up. It widens forces by 0.1 to 0.2 % compared with a weight known to 1 %.
 const ASSUMED_DRIFT: f64 = 0.5e-2;
 
 /// Weighted mean, sum of the weights and sum of their squares.
@@ -111,8 +111,8 @@ fn weighted(group: &[(f64, f64)], variance: &impl Fn(f64) -> f64) -> (f64, f64, 
     (sum / total, total, squares)
 }
 
-/// Standard deviation between presses beyond their errors, and the factor by which so few presses
-/// let it be too small: Student's t over that of a normal distribution.
+/// Standard deviation between presses beyond their errors, and the factor by which it may be too
+/// small for so few presses: Student's t over the normal quantile.
 fn drift(groups: &[Vec<(f64, f64)>; 2]) -> (f64, f64) {
     let (mut excess, mut scale, mut degrees) = (0.0, 0.0, 0_usize);
     for group in groups.iter().filter(|group| !group.is_empty()) {
@@ -157,7 +157,7 @@ mod tests {
         };
         let gain = checked(&[calibrator], 0.06).gain;
         assert!((gain.relative_error() - own.hypot(0.06)).abs() < 1e-12);
-        // Of both the sample counts for more.
+        // If both are present, the sample has the larger weight.
         let darker = check(0.9, 1.0, 0.01, CheckedObject::Calibrator);
         let both = checked(&[sample, darker], 0.06);
         assert!(both.gain.value > 0.8 && both.gain.value < 0.81 && both.drift == 0.0);
@@ -181,14 +181,14 @@ mod tests {
         }
     }
 
-    /// The gain at the time of the frames is one more draw of the same drift.
+    /// The gain at the time of the frames is another draw of the same drift.
     #[test]
     fn intervals_hold_the_gain_of_a_drifting_sensor() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let mut normal = || -> f64 { rng.sample(StandardNormal) };
-        // Drift and own error of a press, relative. With two or three presses the drift is not
-        // always seen. Without drift the one that is assumed, and what scatters by chance, let more
-        // than 95 of 100 hold: 99.5 of three presses.
+        // Relative drift and error of a press. With two or three presses the drift is not always
+        // visible. Without drift, the default drift and chance scatter give a coverage above 95 %:
+        // 99.5 % with three presses.
         for (drift, own, presses, least) in [
             (0.0, 0.01, 1, 0.93),
             (0.0, 0.01, 3, 0.93),

@@ -1,14 +1,15 @@
-//! The guide's layers as they are on the day, from contact radii of balls of known modulus.
+//! The current layers of the guide, from contact radii of balls of known modulus.
 //!
-//! A contact of radius a carries ln F = ln E* + ln f(a, layers). Let x be the departures of ln E,
-//! ln h and ν of all layers from their stated values and C their covariance, V that of what else
-//! moves ln F, and H the derivatives of ln F by x. The departures after the presses are
-//! x = C Hᵀ (H C Hᵀ + V)⁻¹ (ln F − ln F(x) + H x), the iterated Kalman update. Parameters that the
-//! presses do not determine stay as they were stated.
+//! A contact of radius a carries ln F = ln E* + ln f(a, layers). Let x be the deviations of ln E,
+//! ln h and ν of all layers from their stated values, C their covariance, V the covariance of all
+//! other contributions to ln F, and H the derivatives of ln F by x. The deviations after the
+//! presses are x = C Hᵀ (H C Hᵀ + V)⁻¹ (ln F − ln F(x) + H x), the iterated Kalman update.
+//! Parameters that the presses do not determine keep their stated values.
 //!
-//! The size of a pixel, whose error enters V, moves the contacts of the sample too. It is not
-//! updated, but its covariance with x is kept: with K the gain, s the derivatives of ln F by ln a
-//! and σ² the variance of the size, -K s σ² (Schmidt's filter: 1966, Adv. Control Syst. 3, 293).
+//! The error of the pixel size enters V and also affects the contacts of the sample. The pixel size
+//! is not updated, but its covariance with x is kept: with the Kalman gain K, the derivatives s of
+//! ln F by ln a and the variance σ² of the size, it is -K s σ² (Schmidt's filter: 1966, Adv.
+//! Control Syst. 3, 293).
 use super::{KnownBall, is_known, is_positive};
 use crate::core::{Estimate, Source};
 use crate::elasticity::contact::{
@@ -35,20 +36,21 @@ pub(super) struct UpdatedGuide {
 pub(super) struct GuideCheck {
     ball: KnownBall,
     known_n: Estimate,
-    /// With the error that is this contact's own.
+    /// Contact radius. Its error is the part specific to this contact.
     radius_m: Estimate,
 }
 
-/// Standard errors by which a press may contradict what was stated before it is refused.
+/// A press is rejected if it contradicts the stated values by more than this number of standard
+/// errors.
 const LARGEST_DEVIATION: f64 = 4.0;
 
-/// Move of x below which the update has settled: a hundredth of any error that layers have.
+/// The update has converged if x changes by less than this: a hundredth of any error of the layers.
 const SETTLED: f64 = 1e-5;
 
-/// The update is nearly linear in x and settles in three or four rounds.
+/// Maximum number of iterations. The update is nearly linear in x and converges in three or four.
 const MOST_ROUNDS: usize = 10;
 
-/// Step of the derivatives. Downwards, because ν is at most ½.
+/// Step of the finite differences. It is negative because ν is at most ½.
 const STEP: f64 = -1e-3;
 
 impl GuideCheck {
@@ -71,12 +73,12 @@ impl GuideCheck {
         })
     }
 
-    /// ln F at the measured radius on these layers.
+    /// ln F at the measured radius for these layers.
     fn log_force(&self, layers: &[Layer]) -> Option<PressForce> {
         self.ball.log_force(layers, self.radius_m.value)
     }
 
-    /// Relative error of F from the law itself.
+    /// Relative error of F because of the law itself.
     fn law_error(&self, layers: &[Layer]) -> Option<f64> {
         let a = self.radius_m.value;
         match self.ball.youngs_modulus_pa {
@@ -85,7 +87,7 @@ impl GuideCheck {
         }
     }
 
-    /// Errors of ln F: those that presses of this ball share.
+    /// Errors of ln F that presses of this ball share.
     fn ball_errors(&self, layers: &[Layer], here: &PressForce) -> Option<[f64; 3]> {
         let beside = |ball: KnownBall| {
             let there = ball.log_force(layers, self.radius_m.value)?;
@@ -122,7 +124,7 @@ impl KnownBall {
         WaveguideLaw::new(radius, poisson, &guide, Bond::Bonded).ok()
     }
 
-    /// ln F of a contact of radius a (m), with its slopes in ln a and ln R.
+    /// ln F of a contact of radius a (m), with its derivatives in ln a and ln R.
     fn log_force(&self, layers: &[Layer], a: f64) -> Option<PressForce> {
         let Some(modulus) = self.youngs_modulus_pa else {
             let stiffness = |a: f64| guide_log_stiffness(layers, a);
@@ -153,15 +155,15 @@ impl KnownBall {
     }
 }
 
-/// ln F of a press as a law gives it.
+/// ln F of a press according to a law.
 #[derive(Debug)]
 struct PressForce {
     value: f64,
-    /// In ln a.
+    /// Derivative in ln a.
     slope: f64,
-    /// In ln R.
+    /// Derivative in ln R.
     size_slope: f64,
-    /// Standard error of ln F from the law itself.
+    /// Standard error of ln F because of the law itself.
     law_error: f64,
 }
 
@@ -171,7 +173,7 @@ fn log_forces(checks: &[GuideCheck], layers: &[Layer]) -> Option<Vec<PressForce>
     forces.collect()
 }
 
-/// Covariance of ln F of all presses from all but the layers, at the stated layers.
+/// Covariance of ln F of all presses from all sources except the layers, at the stated layers.
 fn noise(
     checks: &[GuideCheck],
     layers: &[Layer],
@@ -187,7 +189,7 @@ fn noise(
     for (i, first) in checks.iter().enumerate() {
         let force = first.known_n.relative_error();
         for (j, second) in checks.iter().enumerate() {
-            // The size of a pixel, the law, and the weights as far as they share an error.
+            // Shared errors: pixel size, law and weights.
             noise[(i, j)] = forces[i].slope * forces[j].slope * length_scale * length_scale
                 + laws[i] * laws[j]
                 + force * second.known_n.relative_error();
@@ -196,14 +198,15 @@ fn noise(
                 noise[(i, j)] += products.sum::<f64>();
             }
         }
-        // Whether weights share an error is not known: it counts as their own, too.
+        // Whether the weights share an error is unknown, so it is also counted as independent.
         let own = forces[i].slope * first.radius_m.relative_error();
         noise[(i, i)] += own * own + force * force;
     }
     Some(noise)
 }
 
-/// The layers and their covariance after the presses, or which press is not usable and why.
+/// The layers and their covariance after the presses, or the index of an unusable press and the
+/// reason.
 pub(super) fn update(
     checks: &[GuideCheck],
     settings: &Settings,
@@ -211,7 +214,7 @@ pub(super) fn update(
     let guide = settings.waveguide.as_ref();
     let stated = guide.map_or(&[][..], Waveguide::layers);
     if stated.is_empty() {
-        let rigid = "the guide is rigid beside the ball: it has no layers to check";
+        let rigid = "the guide is rigid compared with the ball: it has no layers to check";
         return Err((0, rigid));
     }
     let unsolved = (
@@ -231,7 +234,7 @@ pub(super) fn update(
     let log_known = DVector::from_iterator(checks.len(), known);
     let mut x = DVector::zeros(prior.nrows());
     let mut covariance = prior.clone();
-    // Of presses before these.
+    // Covariance from earlier presses.
     let earlier = settings.layers_with_length.clone();
     let earlier = earlier.unwrap_or_else(|| DVector::zeros(prior.nrows()));
     let mut with_length = earlier.clone();
@@ -260,7 +263,7 @@ pub(super) fn update(
         let inverse = whole.cholesky().ok_or(unsolved)?.inverse();
         let gain = &prior * slopes.transpose() * inverse;
         let next = &gain * (gap + &slopes * &x);
-        // Joseph's form stays positive where a parameter is exact.
+        // Joseph's form stays positive definite if a parameter is exact.
         let left = DMatrix::identity(x.len(), x.len()) - &gain * &slopes;
         covariance = &left * &prior * left.transpose() + &gain * &noise * gain.transpose();
         let (kept, moved_by_length) = (&left * &earlier, &gain * &by_length);
@@ -284,7 +287,7 @@ pub(super) fn update(
         .with_layer_errors(covariance.clone(), None)
         .map_err(|_| unsolved)?;
     let factor = bodies.guide_compliance(mean_m);
-    // Earlier presses moved the layers from where they were stated.
+    // Earlier presses moved the layers from their stated values.
     let earlier = settings.checked_guide;
     let ratio = ratio * earlier.map_or(1.0, |earlier| earlier.stiffness.value);
     let checked = CheckedGuide {
@@ -314,7 +317,7 @@ mod tests {
         let rigid = KnownBall::rigid(radius_m);
         let hard = KnownBall::elastic(radius_m, Estimate::exact(200e9));
         let [rigid, hard] = [rigid, hard].map(|ball| ball.log_force(&[gel], 0.3e-3).unwrap());
-        // Finite strain goes as a/R: a few thousandths here.
+        // The effect of finite strain is proportional to a/R: a few thousandths here.
         assert!(
             (rigid.value - hard.value).abs() < 5e-3,
             "{rigid:?} {hard:?}"
@@ -325,8 +328,8 @@ mod tests {
         );
     }
 
-    /// Layers that are stated wrong and pixels that are stated wrong: what is left of the layers'
-    /// error goes with the pixels' as stated.
+    /// Layers and pixel size are both misstated: the remaining error of the layers has the stated
+    /// correlation with that of the pixel size.
     #[test]
     fn layers_err_with_the_pixels_that_checked_them() {
         use crate::pipeline::Object;
@@ -358,7 +361,8 @@ mod tests {
             sum += left.ln() * length_error;
             stated += updated.with_length[0];
         }
-        // A covariance of so many draws is known to 7 %, as both errors are nearly proportional.
+        // A covariance from this number of draws is known to 7 %, because both errors are nearly
+        // proportional.
         assert!((sum / stated - 1.0).abs() < 0.2, "{sum} {stated}");
     }
 }

@@ -1,4 +1,5 @@
-//! Presses of known force beside the frames: the sensor and its guide as they are on the day.
+//! Presses of known force besides the frames: they check the current state of the sensor and its
+//! guide.
 mod gain;
 mod guide;
 
@@ -11,7 +12,7 @@ use gain::GainCheck;
 use guide::GuideCheck;
 use ndarray::ArrayView2;
 
-/// A ball whose radius and modulus are known.
+/// A ball of known radius and modulus.
 ///
 /// ```
 /// use tactile_imaging::{force::Estimate, pipeline::KnownBall};
@@ -23,16 +24,16 @@ use ndarray::ArrayView2;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct KnownBall {
-    /// In metres.
+    /// Radius in metres.
     pub radius_m: Estimate,
-    /// In pascals. `None`: rigid.
+    /// Young's modulus in pascals. `None` for a rigid ball.
     pub youngs_modulus_pa: Option<Estimate>,
-    /// Of an elastic ball.
+    /// Poisson ratio, used for an elastic ball.
     pub poisson_ratio: Estimate,
 }
 
 impl KnownBall {
-    /// A ball far stiffer than the guide.
+    /// A ball much stiffer than the guide.
     #[must_use]
     pub const fn rigid(radius_m: Estimate) -> Self {
         Self {
@@ -42,7 +43,7 @@ impl KnownBall {
         }
     }
 
-    /// An incompressible ball, Poisson's ratio known to 0.01.
+    /// An incompressible ball whose Poisson ratio is known to 0.01.
     #[must_use]
     pub const fn elastic(radius_m: Estimate, youngs_modulus_pa: Estimate) -> Self {
         Self {
@@ -52,29 +53,29 @@ impl KnownBall {
         }
     }
 
-    /// A radius in metres, its error 0.5 % where none is stated.
+    /// A radius in metres. The default error is 0.5 %.
     #[must_use]
     pub fn radius(radius_m: f64, error_m: Option<f64>) -> Estimate {
         Estimate::new(radius_m, error_m.unwrap_or(0.5e-2 * radius_m))
     }
 
-    /// A modulus in pascals, its error 2 % where none is stated.
+    /// A modulus in pascals. The default error is 2 %.
     #[must_use]
     pub fn modulus(modulus_pa: f64, error_pa: Option<f64>) -> Estimate {
         Estimate::new(modulus_pa, error_pa.unwrap_or(2e-2 * modulus_pa))
     }
 }
 
-/// What a press of known force presses.
+/// The object of a press of known force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CheckedObject {
-    /// The object that is measured: the light that it couples is checked too.
+    /// The measured object: its light coupling is checked too.
     Sample,
-    /// The object that the sensor was calibrated with: the gain is checked, but for what the sample
-    /// couples otherwise.
+    /// The object used for the calibration: the gain is checked, but not the coupling of the
+    /// sample.
     Calibrator,
-    /// A ball of known modulus: the guide's layers are checked by its contact radius. Its light is
-    /// not used.
+    /// A ball of known modulus: its contact radius checks the layers of the guide. Its light is not
+    /// used.
     Ball(KnownBall),
 }
 
@@ -84,14 +85,14 @@ pub enum CheckedObject {
 pub struct CheckPress<'a> {
     /// The image.
     pub frame: ArrayView2<'a, u8>,
-    /// The force of the weight or of a gauge.
+    /// The force of the weight or gauge.
     pub known_n: Estimate,
-    /// What was pressed.
+    /// The pressed object.
     pub object: CheckedObject,
 }
 
 impl<'a> CheckPress<'a> {
-    /// A press of an object with a force.
+    /// A press of an object with a known force.
     ///
     /// ```
     /// use tactile_imaging::{force::Estimate, pipeline::{CheckPress, CheckedObject}};
@@ -109,7 +110,7 @@ impl<'a> CheckPress<'a> {
         }
     }
 
-    /// A force in newtons, its error 0.2 % where none is stated.
+    /// A force in newtons. The default error is 0.2 %.
     #[must_use]
     pub fn force(force_n: f64, error_n: Option<f64>) -> Estimate {
         Estimate::new(force_n, error_n.unwrap_or(0.2e-2 * force_n))
@@ -117,12 +118,12 @@ impl<'a> CheckPress<'a> {
 }
 
 impl Pipeline {
-    /// Takes presses of known force into account: of the sample or the calibrator the gain of the
-    /// light ([`CheckedGain`](super::CheckedGain)), of balls of known modulus the layers of the guide
-    /// ([`CheckedGuide`](super::CheckedGuide)). All have one reference. Of one call the errors that presses share (pixel
-    /// size, contact law, ball) are counted as shared. Presses of a later call are taken as
-    /// independent of those before, but for the size of a pixel. A ball costs some dozen solutions
-    /// of its contact.
+    /// Applies presses of known force. Presses of the sample or the calibrator correct the gain of
+    /// the light ([`CheckedGain`](super::CheckedGain)); presses of balls of known modulus correct
+    /// the layers of the guide ([`CheckedGuide`](super::CheckedGuide)). All use the same reference.
+    /// Within one call, the errors common to the presses (pixel size, contact law, ball) are
+    /// treated as shared. Presses of a later call are treated as independent of earlier ones,
+    /// except for the pixel size. A ball costs several dozen solutions of its contact.
     ///
     /// ```
     /// use tactile_imaging::force::{CalibrationPair, Estimate};
@@ -134,7 +135,7 @@ impl Pipeline {
     /// });
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
     /// let (reference, frame) = (hertz(0.0), hertz(120.0));
-    /// // A weight of 1.117 N shows the light of 1.005 N: the lamps are a tenth darker.
+    /// // A weight of 1.117 N gives the light of 1.005 N: the lamps are a tenth darker.
     /// let weight_n = Estimate::new(1.117, 1e-3);
     /// let check = CheckPress::new(frame.view(), weight_n, CheckedObject::Sample);
     /// let pipeline = pipeline.with_checks(reference.view(), &[check])?;
@@ -148,9 +149,9 @@ impl Pipeline {
     /// ```
     ///
     /// # Errors
-    /// [`PipelineError::Check`] for a press that shows no contact or one that cannot be trusted,
-    /// whose known values are not physical, that contradicts the sensor or the stated layers, or,
-    /// of a ball, where the guide has no layers. Those of a [`Press`](super::Press)'s contact.
+    /// [`PipelineError::Check`] for a press that shows no contact, is unreliable, has unphysical
+    /// known values, contradicts the sensor or the stated layers, or is of a ball although the
+    /// guide has no layers. Also the errors of a [`Press`](super::Press)'s contact.
     pub fn with_checks(
         self,
         reference: ArrayView2<'_, u8>,
@@ -197,7 +198,7 @@ impl Pipeline {
         Ok(pipeline)
     }
 
-    /// The contact of a check with the errors that are its own.
+    /// The contact of a check, with only its own errors.
     fn checked_contact(
         &self,
         reference: ArrayView2<'_, u8>,
@@ -205,7 +206,7 @@ impl Pipeline {
     ) -> Result<Option<ContactReading>, PipelineError> {
         let pipeline = self.clone().with_settings(|settings| {
             settings.checked_gain = None;
-            // Errors that all presses share are accounted for once, with what is checked.
+            // Errors common to all presses are counted once, with the checked parameter.
             settings.assumptions.state(Source::Coupling, 0.0);
             settings.assumptions.state(Source::Gain, 0.0);
             if let CheckedObject::Ball(ball) = check.object {
@@ -222,7 +223,7 @@ impl Pipeline {
     }
 }
 
-/// Whether a value and its error are numbers, the value a positive one.
+/// Whether a value and its error are numbers and the value is positive.
 fn is_positive(estimate: Estimate) -> bool {
     estimate.value > 0.0 && is_known(estimate)
 }
@@ -233,7 +234,7 @@ fn is_known(estimate: Estimate) -> bool {
     estimate.value.is_finite() && error >= 0.0 && error.is_finite()
 }
 
-/// Refuses a contact whose force and radius are not those of the whole object.
+/// Rejects a contact whose force and radius do not cover the whole object.
 fn trusted(contact: &ContactReading) -> Result<(), &'static str> {
     let doubts = [
         (
