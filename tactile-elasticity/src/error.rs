@@ -1,8 +1,8 @@
-//! What can be wrong with the input, one variant each.
+//! Errors of the input, one variant each.
 
 use tactile_core::{CustomError, Readable};
 
-/// Why a strain, a stress or a modulus cannot be given.
+/// Why a strain, a stress or a modulus cannot be computed.
 ///
 /// ```
 /// use tactile_elasticity::{ElasticityError, modulus::HertzSphere};
@@ -17,26 +17,26 @@ pub enum ElasticityError {
     /// An input is NaN or infinite.
     #[error("{quantity} is not a finite number")]
     NotFinite {
-        /// Which input.
+        /// The input.
         quantity: Quantity,
     },
-    /// An input that must be greater than zero is not (NaN included).
+    /// An input is not greater than zero, or NaN.
     #[error("{quantity} must be greater than zero and finite, found {}", Readable(*found))]
     NotPositive {
-        /// Which input.
+        /// The input.
         quantity: Quantity,
         /// The value given.
         found: f64,
     },
-    /// An input that must not be negative is (NaN included).
+    /// An input is negative, or NaN.
     #[error("{quantity} must not be negative, found {}", Readable(*found))]
     Negative {
-        /// Which input.
+        /// The input.
         quantity: Quantity,
         /// The value given.
         found: f64,
     },
-    /// A Poisson ratio outside (−1, ½], where an isotropic solid is stable.
+    /// A Poisson ratio is outside (−1, ½], the stable range of an isotropic solid.
     #[error("Poisson ratio must lie in (-1, 1/2], found {}", Readable(*found))]
     PoissonRatio {
         /// The value given.
@@ -51,51 +51,52 @@ pub enum ElasticityError {
         /// det F.
         determinant: f64,
     },
-    /// The contact is no softer than the other body alone: no compliance is left for the sample.
+    /// The contact is at least as stiff as the other body alone, so no compliance remains for the
+    /// sample.
     #[error(
         "the sample is stiffer than can be resolved through this waveguide or indenter{}",
         bounded_below(*.lower_bound_pa)
     )]
     StifferThanResolvable {
-        /// The 95 % lower limit of the modulus. None where the errors are unknown, and where the
-        /// contact is stiffer than any sample could make it.
+        /// 95 % lower limit of the modulus. `None` if the errors are unknown, or if the contact is
+        /// stiffer than any sample could make it.
         lower_bound_pa: Option<f64>,
     },
-    /// The contact of a load is beyond what the law describes, and no other load is within it.
+    /// The contact of a load is outside the range of the law, and no other load is within it.
     #[error("load {}: the contact is beyond what the law describes", load + 1)]
     BeyondLaw {
         /// Index of the load.
         load: usize,
     },
-    /// A measure of strain whose value along an axis depends on the stretches across it: no stress
-    /// along the axis does its work.
+    /// The value of the strain measure along an axis depends on the stretches across it, so no
+    /// stress along the axis is conjugate to it.
     #[error("no stress is conjugate to the strain measure {measure}")]
     NoConjugateStress {
-        /// The measure's name.
+        /// Name of the measure.
         measure: &'static str,
     },
-    /// Fewer usable loads than the estimator needs.
+    /// There are fewer usable loads than the estimator needs.
     #[error("{found} usable loads, at least {expected} are needed")]
     TooFewLoads {
-        /// How many the estimator needs.
+        /// Number of loads that the estimator needs.
         expected: usize,
-        /// How many of those given carry what it needs.
+        /// Number of loads with the required quantities.
         found: usize,
     },
-    /// All the loads are equal, so that no slope can be formed.
+    /// All loads are equal, so they determine no slope.
     #[error("all loads are equal: a slope needs at least two different ones")]
     EqualLoads,
     /// The strain is zero: stress over strain is undefined.
     #[error("the strain is zero: stress over strain is undefined")]
     ZeroStrain,
-    /// Loads that follow each other are not in the order of time.
-    #[error("load {load} was at {found_s} s, before the one that it follows ({before_s} s)")]
+    /// Consecutive loads are not in the order of time.
+    #[error("load {load} was at {found_s} s, before the preceding load ({before_s} s)")]
     TimeDecreases {
-        /// Its index among the loads given.
+        /// Index of the load.
         load: usize,
-        /// The time of the load before.
+        /// Time of the preceding load.
         before_s: f64,
-        /// The time given.
+        /// Time of this load.
         found_s: f64,
     },
     /// Stress and strain have opposite signs.
@@ -109,17 +110,17 @@ pub enum ElasticityError {
     /// A load lacks a quantity that this estimator needs.
     #[error("load {load} has no {quantity}")]
     Missing {
-        /// Its index among the loads given.
+        /// Index of the load.
         load: usize,
-        /// What is missing.
+        /// The missing quantity.
         quantity: Quantity,
     },
-    /// Two inputs that belong together differ in length.
+    /// Two corresponding inputs differ in length.
     #[error("{quantity}: expected {expected} entries, found {found}")]
     LengthMismatch {
-        /// Which input.
+        /// The input.
         quantity: Quantity,
-        /// The length the other input asks for.
+        /// Required length, from the other input.
         expected: usize,
         /// The length given.
         found: usize,
@@ -127,13 +128,14 @@ pub enum ElasticityError {
     /// A covariance matrix is not symmetric and positive semidefinite.
     #[error("the covariance of {quantity} is not positive semidefinite")]
     Covariance {
-        /// Of what.
+        /// The quantity of the covariance.
         quantity: Quantity,
     },
-    /// The law does not reach this far (a contact radius beyond the sphere's own, say).
+    /// A value is outside the range of the law, such as a contact radius larger than the sphere's
+    /// radius.
     #[error("{quantity} = {} is beyond the law's reach ({})", Readable(*found), Readable(*limit))]
     OutOfRange {
-        /// Which input.
+        /// The input.
         quantity: Quantity,
         /// The value given.
         found: f64,
@@ -143,33 +145,33 @@ pub enum ElasticityError {
     /// A contact table was made for another ball or guide.
     #[error("the contact table was made for {quantity} {expected}, not {found}")]
     TableMismatch {
-        /// What differs.
+        /// The quantity that differs.
         quantity: Quantity,
-        /// The table's.
+        /// Value of the table.
         expected: f64,
-        /// What was given.
+        /// Value given.
         found: f64,
     },
-    /// A contact table of another version of its format.
+    /// A contact table has another format version.
     #[error("a contact table of version {expected} is needed, found version {found}")]
     TableVersion {
         /// The version that this crate reads.
         expected: u32,
-        /// The file's.
+        /// The version of the file.
         found: u32,
     },
-    /// The contacts of a table do not make a force that grows with contact radius and modulus.
+    /// The contacts of a table do not give a force that increases with contact radius and modulus.
     #[error("the table's force does not grow with contact radius and modulus everywhere")]
     NotMonotone,
-    /// Finite elements did not reach a contact that a table needs.
+    /// The finite elements did not converge at a contact that a table needs.
     #[error(
         "the solver stopped at {force_n} N with E = {youngs_modulus_pa} Pa: \
          the table lacks larger contacts"
     )]
     NotReached {
-        /// The ball's modulus.
+        /// Modulus of the ball.
         youngs_modulus_pa: f64,
-        /// The largest force in equilibrium.
+        /// The largest force with an equilibrium.
         force_n: f64,
     },
     /// The caller cancelled the computation.
@@ -184,16 +186,16 @@ pub enum ElasticityError {
     /// An element of a finite-element mesh is degenerate or turned inside out.
     #[error("element {element} of the mesh is degenerate or turned inside out")]
     DegenerateElement {
-        /// Its index.
+        /// Index of the element.
         element: usize,
     },
-    /// An estimator, a law or a measure of a user's own failed.
+    /// A user-defined estimator, law or measure failed.
     #[error(transparent)]
     Custom(CustomError),
 }
 
 impl ElasticityError {
-    /// The failure of an estimator, a law or a measure of one's own.
+    /// Wraps the error of a user-defined estimator, law or measure.
     ///
     /// ```
     /// use tactile_elasticity::ElasticityError;
@@ -205,7 +207,7 @@ impl ElasticityError {
     }
 }
 
-/// The quantity that an error is about.
+/// The quantity to which an error refers.
 ///
 /// ```
 /// use tactile_elasticity::{ElasticityError, Quantity, laws::HertzLaw};
@@ -273,7 +275,7 @@ impl core::fmt::Display for Quantity {
 }
 
 impl Quantity {
-    /// `value` if it is finite and above zero.
+    /// Returns `value` if it is finite and above zero.
     ///
     /// ```
     /// use tactile_elasticity::Quantity;
@@ -294,7 +296,7 @@ impl Quantity {
         }
     }
 
-    /// `value` if it is finite and not below zero.
+    /// Returns `value` if it is finite and not negative.
     ///
     /// # Errors
     /// [`ElasticityError::Negative`].
@@ -309,7 +311,7 @@ impl Quantity {
         }
     }
 
-    /// `value` if it is finite.
+    /// Returns `value` if it is finite.
     ///
     /// # Errors
     /// [`ElasticityError::NotFinite`].
@@ -321,7 +323,7 @@ impl Quantity {
         }
     }
 
-    /// Refuses another number of entries than expected.
+    /// Rejects a number of entries other than the expected one.
     ///
     /// # Errors
     /// [`ElasticityError::LengthMismatch`].
@@ -329,7 +331,7 @@ impl Quantity {
         self.between(found, expected, expected)
     }
 
-    /// Refuses fewer entries than expected.
+    /// Rejects fewer entries than expected.
     ///
     /// # Errors
     /// [`ElasticityError::LengthMismatch`].
@@ -348,7 +350,7 @@ impl Quantity {
         })
     }
 
-    /// Refuses numbers that are not above zero, and each above the one before.
+    /// Rejects numbers that are not positive or not in strictly ascending order.
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::OutOfRange`].
@@ -364,7 +366,7 @@ impl Quantity {
         Ok(())
     }
 
-    /// The error of a value beyond a limit.
+    /// The error for a value outside a limit.
     ///
     /// ```
     /// use tactile_elasticity::Quantity;
@@ -380,7 +382,7 @@ impl Quantity {
     }
 }
 
-/// `value` if it is a Poisson ratio in (−1, ½].
+/// Returns `value` if it is a Poisson ratio in (−1, ½].
 pub(crate) fn poisson(value: f64) -> Result<f64, ElasticityError> {
     if value > -1.0 && value <= 0.5 {
         Ok(value)
@@ -389,7 +391,8 @@ pub(crate) fn poisson(value: f64) -> Result<f64, ElasticityError> {
     }
 }
 
-/// The end of a sentence: above what the modulus lies, or what to look at where no sample would do.
+/// The end of the message: the lower limit of the modulus, or what to check if no sample could
+/// explain the contact.
 fn bounded_below(lower_bound_pa: Option<f64>) -> String {
     match lower_bound_pa {
         Some(bound) => format!(

@@ -1,10 +1,10 @@
-//! Strain at many points: its mean, spread and error.
+//! Strain at many points: mean, spread and error.
 
 use crate::error::{ElasticityError, Quantity};
 use crate::strain::{Deformation, StrainMeasure};
 use nalgebra::{Matrix3, Point3, Vector3};
 
-/// Averages of a strain field, component by component.
+/// Averages of a strain field, by component.
 ///
 /// ```
 /// use nalgebra::Matrix3;
@@ -26,29 +26,28 @@ pub struct StrainSummary {
     pub mean: Matrix3<f64>,
     /// Weighted standard deviation over the field.
     pub spread: Matrix3<f64>,
-    /// Standard error of the mean, as if the points were independent: spread/√n_eff, n_eff =
-    /// (Σw)²/Σw².
+    /// Standard error of the mean for independent points: spread/√n_eff, with n_eff = (Σw)²/Σw².
     pub standard_error: Matrix3<f64>,
-    /// Points that count.
+    /// Number of points used.
     pub used: usize,
-    /// Indices of the points where det F ≤ 0, left out of the averages.
+    /// Indices of the points with det F ≤ 0, which are excluded from the averages.
     pub folded: Vec<usize>,
 }
 
-/// Strain at points, with the weight (area, volume) of each.
+/// Strain at points, each with its weight (area, volume).
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct StrainField {
-    /// The strain at every point. Zero where the deformation folds.
+    /// Strain at each point. Zero if the deformation folds there.
     pub strains: Vec<Matrix3<f64>>,
-    /// The weight of every point. Zero where the deformation folds.
+    /// Weight of each point. Zero if the deformation folds there.
     pub weights: Vec<f64>,
-    /// The points at which the deformation folds, det F ≤ 0.
+    /// Points at which the deformation folds, det F ≤ 0.
     pub folded: Vec<usize>,
 }
 
 impl StrainField {
-    /// Strain of every displacement gradient, equal weights.
+    /// Computes the strain of each displacement gradient, with equal weights.
     ///
     /// # Errors
     /// [`ElasticityError::NotFinite`].
@@ -78,8 +77,8 @@ impl StrainField {
         Ok(field)
     }
 
-    /// As [`from_gradients`](Self::from_gradients), in the memory of this field: for as many points
-    /// nothing is allocated.
+    /// Like [`from_gradients`](Self::from_gradients), reusing the memory of this field. Nothing is
+    /// allocated for the same number of points.
     ///
     /// ```
     /// use nalgebra::Matrix3;
@@ -100,7 +99,7 @@ impl StrainField {
     /// ```
     ///
     /// # Errors
-    /// As [`from_gradients`](Self::from_gradients). The field is then empty.
+    /// Those of [`from_gradients`](Self::from_gradients). The field is then empty.
     pub fn set_gradients(
         &mut self,
         gradients: &[Matrix3<f64>],
@@ -192,22 +191,22 @@ impl StrainField {
     }
 }
 
-// Three errors go beyond the spread of the strain over the points. Those of a reconstructed surface
-// are shared by neighbours, so that n points know less than n independent ones: residuals of the
-// affine fit are added up over runs of neighbours, and the sums taken as independent
-// (cluster-robust errors: Liang & Zeger, Biometrika 73, 1986). And the contact's edge, to which the
-// points are tied, is known to a part of a pixel: the smaller contact is off by more, relatively.
-// Third, errors of the first surface's points make any fit to them too flat (regression dilution:
-// Fuller, Measurement Error Models, 1987, §1.1).
+// Three errors are not contained in the spread of the strain over the points. First, neighbours
+// share the errors of a reconstructed surface, so n points carry less information than n
+// independent ones: residuals of the affine fit are summed over runs of neighbours, and the sums
+// are treated as independent (cluster-robust errors: Liang & Zeger, Biometrika 73, 1986). Second,
+// the edge of the contact, to which the points are tied, is known to a fraction of a pixel: the
+// smaller contact has the larger relative error. Third, errors of the first surface's points make
+// any fit to them too flat (regression dilution: Fuller, Measurement Error Models, 1987, §1.1).
 
-// How far, in pixels of the surfaces, the edge of a mask lies from the contact's.
+// Distance, in pixels of the surfaces, between the edge of a mask and that of the contact.
 const EDGE_PX: f64 = 0.5;
 
 /// Standard errors of the mean Green–Lagrange strain between matched points of two reconstructed
 /// surfaces.
 ///
-/// `grid_m` is the surfaces' pixel in metres. `run_length` is the number of neighbours in the order
-/// given that share the errors of a surface. O(n).
+/// `grid_m` is the pixel size of the surfaces in metres. `run_length` is the number of consecutive
+/// neighbours that share the errors of a surface. O(n).
 ///
 /// ```
 /// use nalgebra::Point3;
@@ -234,8 +233,8 @@ pub fn mean_strain_error(
     let [from, to] = [sources, targets].map(Disc::of);
     let offsets = || pairs_of(sources, targets, [&from, &to]);
     let spread: Matrix3<f64> = offsets().map(|(d, _)| d * d.transpose()).sum();
-    // What the points do not span they know nothing of: a little of their size keeps the inverse
-    // finite.
+    // Directions that the points do not span are undetermined. A small multiple of the identity
+    // keeps the inverse finite.
     let inverse = (spread + Matrix3::identity() * (1e-12 * spread.trace())).try_inverse();
     let Some(inverse) = inverse else {
         return Matrix3::zeros();
@@ -265,7 +264,7 @@ pub fn mean_strain_error(
     })
 }
 
-/// The disc in the image plane that has the points' centroid and spread.
+/// The disc in the image plane with the centroid and spread of the points.
 struct Disc {
     centroid: Vector3<f64>,
     radius: f64,
@@ -282,7 +281,7 @@ impl Disc {
     }
 }
 
-/// The pairs' offsets from their centroids.
+/// Offsets of the pairs from their centroids.
 fn pairs_of<'a>(
     sources: &'a [Point3<f64>],
     targets: &'a [Point3<f64>],
@@ -292,7 +291,7 @@ fn pairs_of<'a>(
     pairs.map(|(s, t)| (s.coords - from.centroid, t.coords - to.centroid))
 }
 
-/// Standard errors of the affine gradient's entries, runs of neighbours being independent.
+/// Standard errors of the entries of the affine gradient, with independent runs of neighbours.
 fn clustered(
     mut offsets: impl ExactSizeIterator<Item = (Vector3<f64>, Vector3<f64>)>,
     run_length: usize,
@@ -307,7 +306,7 @@ fn clustered(
         let share = sum * inverse;
         variance += share.component_mul(&share);
     }
-    // The fit itself takes four of the runs' degrees of freedom.
+    // The fit uses four degrees of freedom of the runs.
     let runs = runs as f64;
     variance.map(|v| (v * runs / (runs - 4.0).max(1.0)).sqrt())
 }

@@ -19,17 +19,17 @@ fn wave(i: usize) -> f64 {
 fn exact_pairs_have_no_error_but_the_edges() {
     let sources = dome();
     let targets: Vec<_> = sources.iter().map(|p| p * 1.2).collect();
-    // What is added to keep the inverse finite, 1e-12 of the trace, and rounding.
+    // The term that keeps the inverse finite is 1e-12 of the trace; the rest is rounding.
     assert!(mean_strain_error(&sources, &targets, 0.0, RUN_LENGTH).amax() < 1e-10);
     let edge = mean_strain_error(&sources, &targets, 0.1, RUN_LENGTH);
     let disc = (2.0 * sources.iter().map(|p| p.x * p.x + p.y * p.y).sum::<f64>() / 200.0).sqrt();
     let expected = 1.44 * EDGE_PX * 0.1 * (1.0 - 1.0 / 1.2) / disc;
-    // The disc's centroid is not quite the origin.
+    // The centroid of the disc is close to the origin, but not exactly there.
     assert!((edge[(2, 2)] / expected - 1.0).abs() < 1e-3, "{edge}");
 }
 
-/// Monte Carlo: errors shared by runs of neighbours, the mean strain's true error beside the one
-/// told.
+/// Monte Carlo test with errors shared by runs of neighbours: compares the true error of the mean
+/// strain with the stated one.
 #[test]
 fn errors_that_neighbours_share_are_told() {
     let sources = dome();
@@ -50,8 +50,8 @@ fn errors_that_neighbours_share_are_told() {
         true_square += (0.5 * (slope * slope - 1.44)).powi(2);
     }
     let ratio = (told / true_square).sqrt();
-    // Twenty runs of which the fit takes four: the mean variance over 200 trials is known to a
-    // tenth or so.
+    // There are twenty runs, of which the fit uses four: the mean variance over 200 trials is known
+    // to about a tenth.
     assert!((0.8..1.3).contains(&ratio), "{ratio}");
 }
 

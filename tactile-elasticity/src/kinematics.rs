@@ -1,32 +1,33 @@
-//! What is read of a deformation beside its strain, each quantity with its standard error.
+//! Quantities derived from a deformation besides its strain, each with its standard error.
 
 use crate::error::ElasticityError;
 use crate::strain::{Deformation, PrincipalStretches, StrainMeasure, symmetric_eigen};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
-/// Step along a derivative that is not known: any step shows which quantities follow it.
+/// Step along an unknown derivative. A step of any size reveals which quantities depend on it.
 const UNKNOWN_STEP: f64 = 1e-3;
 
-/// Rotation, principal strains, change of size and equivalent strain at a place, with errors.
+/// Rotation, principal strains, volume change and equivalent strain at a point, with errors.
 ///
-/// Errors are carried from the displacement gradient to first order. They are infinite for what
-/// follows a derivative of infinite variance, along an axis that points do not span.
+/// Errors are propagated from the displacement gradient to first order. They are infinite for
+/// quantities that depend on a derivative of infinite variance, along an axis that the points do
+/// not span.
 ///
-/// In the plane nothing happens along z: H has no row and column there, the ratio is of areas, and
-/// the equivalent strain is that of plane strain.
+/// In the plane nothing changes along z: H has zeros there, the ratio is of areas, and the
+/// equivalent strain is that of plane strain.
 ///
 /// ```
 /// use nalgebra::Matrix3;
 /// use tactile_elasticity::kinematics::StrainQuantities;
 /// use tactile_elasticity::strain::GreenLagrange;
-/// // A sheet that shears: x moves by 2 % of y.
+/// // A sheet in shear: x moves by 2 % of y.
 /// let h = Matrix3::new(0.0, 0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
 /// let variance = Matrix3::from_diagonal(&[1e-6, 1e-6, 0.0].into());
 /// let found = StrainQuantities::of(&h, &variance, 2, &GreenLagrange)?;
-/// // It turns clockwise by about half of that, with the error of half a sum of two derivatives.
+/// // It rotates clockwise by about half of that, with the error of half a sum of two derivatives.
 /// assert!((found.rotation_rad + 0.01).abs() < 1e-5);
 /// assert!((found.rotation_error_rad - 1e-3 / 2_f64.sqrt()).abs() < 1e-6);
-/// // Areas stay, and it is stretched most along the diagonal.
+/// // Its area is unchanged, and it is stretched most along the diagonal.
 /// assert!((found.size_ratio - 1.0).abs() < 1e-15);
 /// assert!((found.principal[0] - 0.01).abs() < 2e-4 && found.directions[(0, 0)].abs() > 0.7);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -36,7 +37,7 @@ const UNKNOWN_STEP: f64 = 1e-3;
 pub struct StrainQuantities {
     /// Displacement gradient H, row i of displacement i.
     pub gradient: Matrix3<f64>,
-    /// Its standard errors.
+    /// Standard errors of the gradient.
     pub gradient_error: Matrix3<f64>,
     /// Angle of the rotation R of F = R U: counter-clockwise from x to y in the plane, about its own
     /// axis and from 0 to π in space.
@@ -45,23 +46,23 @@ pub struct StrainQuantities {
     pub rotation_error_rad: f64,
     /// Principal strains, largest first: two in the plane and 0.
     pub principal: [f64; 3],
-    /// Their standard errors.
+    /// Standard errors of the principal strains.
     pub principal_error: [f64; 3],
-    /// Their directions, a column each, up to sign.
+    /// Principal directions, one per column, up to sign.
     pub directions: Matrix3<f64>,
     /// Standard errors of the directions' angles. Directions of equal strains are undetermined.
     pub direction_error_rad: [f64; 3],
-    /// det F: volume, in the plane area, over that before.
+    /// det F: the volume (in the plane, the area) relative to the undeformed one.
     pub size_ratio: f64,
-    /// Its standard error.
+    /// Standard error of the ratio.
     pub size_ratio_error: f64,
     /// Von Mises' equivalent strain √(⅔ e′:e′), e′ the deviator.
     pub equivalent: f64,
-    /// Its standard error.
+    /// Standard error of the equivalent strain.
     pub equivalent_error: f64,
 }
 
-/// Quantities that follow a gradient.
+/// Quantities derived from a gradient.
 #[derive(Clone, Copy)]
 struct Followers {
     rotation: f64,
@@ -72,11 +73,12 @@ struct Followers {
 }
 
 impl StrainQuantities {
-    /// Of a displacement gradient, whose rows have this covariance each and are independent of each
-    /// other, in the plane (`axes` 2) or in space (3). Strains are those of `measure`.
+    /// Computes the quantities from a displacement gradient. Each of its rows has this covariance,
+    /// and the rows are independent. `axes` is 2 in the plane and 3 in space. Strains are those of
+    /// `measure`.
     ///
     /// # Errors
-    /// As [`StrainMeasure::of`].
+    /// Those of [`StrainMeasure::of`].
     pub fn of(
         h: &Matrix3<f64>,
         row_covariance: &Matrix3<f64>,
@@ -91,7 +93,7 @@ impl StrainQuantities {
                 (0..axes).for_each(|axis| moved[(row, axis)] += direction[axis]);
                 match Followers::of(&moved, axes, measure) {
                     Ok(moved) => squares.add(&centre, &moved, factor),
-                    // A fold within the error.
+                    // The deformation folds within the error.
                     Err(_) => squares.add(&centre, &centre, f64::NAN),
                 }
             }
@@ -116,7 +118,7 @@ impl StrainQuantities {
         })
     }
 
-    /// Nothing is known: NaN throughout, as where a deformation folds.
+    /// All quantities undetermined: NaN throughout, as for a deformation that folds.
     ///
     /// ```
     /// use tactile_elasticity::kinematics::StrainQuantities;
@@ -142,8 +144,8 @@ impl StrainQuantities {
     }
 }
 
-/// Steps of a standard deviation along the principal directions of a row's covariance, and steps
-/// along unknown derivatives, whose squares count infinitely.
+/// Steps of one standard deviation along the principal directions of a row's covariance, and steps
+/// along unknown derivatives, whose squares have infinite weight.
 fn steps(covariance: &Matrix3<f64>, axes: usize) -> Vec<(Vector3<f64>, f64)> {
     let known = |a: usize| a < axes && covariance[(a, a)].is_finite();
     let finite = Matrix3::from_fn(|a, b| match known(a) && known(b) {
@@ -219,7 +221,7 @@ impl Followers {
     }
 }
 
-/// The two principal strains of the plane and their directions, then z with none.
+/// The two principal strains of the plane with their directions, then zero along z.
 fn principal_in_plane(e: &Matrix3<f64>) -> ([f64; 3], Matrix3<f64>) {
     let (middle, half) = (0.5 * (e[(0, 0)] + e[(1, 1)]), 0.5 * (e[(0, 0)] - e[(1, 1)]));
     let radius = half.hypot(e[(0, 1)]);

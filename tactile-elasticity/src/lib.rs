@@ -1,8 +1,8 @@
 #![doc = include_str!("../README.md")]
 //!
 //! # Conventions
-//! SI units. Tensors are `nalgebra::Matrix3`. x = column, y = row, z towards the object. Everything
-//! is computed in `f64`.
+//! SI units are used. Tensors are `nalgebra::Matrix3`, with x = column, y = row and z towards the
+//! object. Everything is computed in `f64`.
 //!
 //! # References
 //! K. L. Johnson, *Contact Mechanics* (1985). I. N. Sneddon, Int. J. Eng. Sci. 3 (1965) 47.
@@ -11,13 +11,13 @@
 //!
 //! # Equations
 //! $F = I + H$ is the deformation gradient, $H = \nabla u$.
-//! $1/E^{\ast} = (1 - \nu_1^2)/E_1 + (1 - \nu_2^2)/E_2$. Numbers are the paper's.
+//! $1/E^{\ast} = (1 - \nu_1^2)/E_1 + (1 - \nu_2^2)/E_2$. Equation numbers are those of the paper.
 //!
 //! - Green–Lagrange (25)–(30):
 //!   $E = \frac{1}{2}(F^T F - I) = \frac{1}{2}(H + H^T + H^T H)$. O(1) a gradient.
 //! - Euler–Almansi $\frac{1}{2}(I - F^{-T} F^{-1})$, Hencky $\ln U$, Biot $U - I$, infinitesimal
 //!   $\frac{1}{2}(H + H^T)$.
-//! - The paper's ratio (31): $E = S_{zz}/\bar e_{zz}$, right in uniaxial loading.
+//! - The paper's ratio (31): $E = S_{zz}/\bar e_{zz}$, correct under uniaxial loading.
 //! - Hertz: $a^3 = 3FR/(4E^{\ast})$, $\delta = a^2/R$,
 //!   $F = \frac{4}{3} E^{\ast} \sqrt{R} \delta^{3/2}$, $p = p_0 \sqrt{1 - r^2/a^2}$.
 //! - Flat punch: $F = 2 E^{\ast} a \delta$. Cone:
@@ -26,8 +26,8 @@
 //!   (\delta - s^2/R)$, $F = 2\pi \int_0^a \varphi$. O(n³) with some 24 + 6 a/h nodes, tabulated by
 //!   the estimators.
 //!
-//! Errors are [`ElasticityError`]. What weakens an estimate without forbidding it is a
-//! [`modulus::Warning`].
+//! Errors are [`ElasticityError`]. A [`modulus::Warning`] weakens an estimate without preventing
+//! it.
 #![forbid(unsafe_code)]
 
 pub mod contact;

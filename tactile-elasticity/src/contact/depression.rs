@@ -4,7 +4,7 @@ use super::layers::{Bond, LayerKernel};
 use super::waveguide::Waveguide;
 use crate::error::{ElasticityError, Quantity};
 
-/// Depth in metres to which a ball's contact presses the surface of layers at each distance from
+/// Depth in metres by which a ball's contact indents the surface of layers, at each distance from
 /// its centre.
 ///
 /// ```math
@@ -12,17 +12,17 @@ use crate::error::{ElasticityError, Quantity};
 /// P(k) = p_0 \frac{\sin ka - ka \cos ka}{a k^3}, \qquad p_0 = \frac{3F}{2\pi a^2}
 /// ```
 ///
-/// with E* = E/(1 − ν²) of the touched layer and L the yield of the layers beside a half-space's
-/// (Johnson, *Contact Mechanics*, 1985, 5.8). The half-space's part is Hertz's closed form, so that
-/// only the difference is integrated. Small strains, and Hertz's pressure: where layers are thin
-/// beside the contact the pressure is flatter. Costs some hundred solutions of the layers, and as
-/// many Bessel functions a distance.
+/// with E* = E/(1 − ν²) of the touched layer and L the compliance of the layers relative to that of
+/// a half-space (Johnson, *Contact Mechanics*, 1985, 5.8). The part of the half-space is Hertz's
+/// closed form, so only the difference is integrated. Strains are assumed small and the pressure
+/// Hertzian; on layers that are thin compared with the contact, the pressure is flatter. It costs
+/// several hundred solutions of the layers, and as many Bessel functions per distance.
 ///
 /// ```
 /// use tactile_elasticity::contact::{Bond, Layer, Waveguide, depression_m};
 /// let gel = Layer { thickness_m: 10e-3, youngs_modulus_pa: 75e3, poisson_ratio: 0.5 };
 /// let guide = Waveguide::new(vec![gel])?;
-/// // A force of 0.1 N on a disc of 1 mm: a half-space of E* = 100 kPa yields by 3F/(4aE*).
+/// // A force of 0.1 N on a disc of 1 mm indents a half-space of E* = 100 kPa by 3F/(4aE*).
 /// let depth = depression_m(&guide, Bond::Bonded, 0.1, 1e-3, &[0.0, 40e-3])?;
 /// assert!(depth[0] < 0.75e-3 && depth[0] > 0.6e-3, "less, for the rigid base");
 /// assert!(depth[1].abs() < 1e-6, "far away nothing moves");
@@ -65,12 +65,12 @@ pub fn depression_m(
     Ok(distances_m.iter().map(depth).collect())
 }
 
-/// (sin x − x cos x)/x³, which is ⅓ − x²/30 where x is small and the terms cancel.
+/// (sin x − x cos x)/x³, replaced by ⅓ − x²/30 for small x, where the terms cancel.
 fn hertz_transform(x: f64) -> f64 {
     if x > 0.1 {
         return (x.sin() - x * x.cos()) / x.powi(3);
     }
     let square = x * x;
-    // At x = 0.1 the first term left out is 10⁻¹³.
+    // At x = 0.1 the first neglected term is 10⁻¹³.
     1.0 / 3.0 - square / 30.0 * (1.0 - square / 28.0 * (1.0 - square / 54.0))
 }

@@ -1,5 +1,5 @@
-//! The guide under a ball, by the parameters of its layers: its stiffness, the derivatives of it and
-//! its error.
+//! The guide under a ball: its stiffness, the derivatives by the parameters of its layers, and its
+//! error.
 
 use super::layers::log_force_slopes;
 use super::{Bond, Layer, LayerEquation, Waveguide};
@@ -8,20 +8,20 @@ use nalgebra::{DMatrix, DVector};
 use std::sync::OnceLock;
 use tactile_core::{Source, Uncertain};
 
-/// Parameters of a layer whose errors count: ln E, ln h and ν.
+/// Number of parameters of a layer with errors: ln E, ln h and ν.
 pub const PARAMETERS_PER_LAYER: usize = 3;
 
-// Step of the numerical derivatives: third powers of it are lost, rounding of the integral
-// equation is far below.
+// Step of the numerical derivatives. The error is of third order in it, and rounding of the
+// integral equation is far below.
 const STEP: f64 = 1e-3;
 
-/// ln of the stiffness E_g of the guide under a ball's contact of radius a, F = 4/3 E_g a³/R. None
-/// where the layer equation cannot be solved.
+/// ln of the stiffness E_g of the guide under a ball's contact of radius a, F = 4/3 E_g a³/R.
+/// `None` if the layer equation cannot be solved.
 ///
 /// ```
 /// use tactile_elasticity::contact::{Layer, guide_log_stiffness};
 /// let gel = Layer { thickness_m: 10e-3, youngs_modulus_pa: 75e3, poisson_ratio: 0.5 };
-/// // Under a small contact the guide is a half-space, E/(1 − ν²).
+/// // For a small contact the guide is a half-space, E/(1 − ν²).
 /// let stiffness_pa = guide_log_stiffness(&[gel], 1e-5).unwrap().exp();
 /// assert!((stiffness_pa / 100e3 - 1.0).abs() < 0.01);
 /// ```
@@ -33,8 +33,8 @@ pub fn guide_log_stiffness(layers: &[Layer], radius_m: f64) -> Option<f64> {
     Some(plane_strain.ln() + contact.force_ratio_same_radius.ln())
 }
 
-/// Layers with their parameters moved by a step: ln E of all layers, then ln h, then ν, which stays
-/// at most ½.
+/// Layers with their parameters changed by a step: ln E of all layers, then ln h, then ν, which is
+/// limited to ½.
 ///
 /// ```
 /// use nalgebra::DVector;
@@ -53,13 +53,14 @@ pub fn stepped_layers(layers: &[Layer], step: &DVector<f64>) -> Vec<Layer> {
     layers.iter().enumerate().map(layer).collect()
 }
 
-/// Relative error of F = 4/3 E_g a³/R at a/R = 1 from taking a rigid ball for a parabola and strains
-/// as small. It goes as (a/R)².
+/// Relative error of F = 4/3 E_g a³/R at a/R = 1, because a rigid ball is approximated by a
+/// parabola and strains are assumed small. It is proportional to (a/R)².
 pub const PARABOLA_ERROR: f64 = 0.1;
 
-/// Derivatives by parameters x of values that are `here` at x, as of forces by
-/// [`stepped_layers`]'s parameters: \[value, parameter\]. Steps are downwards, as ν is at most ½.
-/// Parameters that do not move have zeros. `None` if the values are.
+/// Derivatives of values by parameters x, such as of forces by the parameters of
+/// [`stepped_layers`], as a matrix \[value, parameter\]. `here` holds the values at x. Steps are
+/// negative, because ν is at most ½. Parameters without a step have zeros. `None` if the values are
+/// `None`.
 ///
 /// ```
 /// use nalgebra::DVector;
@@ -92,7 +93,7 @@ pub fn parameter_slopes(
 fn log_stiffness_gradient(guide: &Waveguide, radius_m: f64) -> Option<DVector<f64>> {
     let layers = guide.layers();
     let count = PARAMETERS_PER_LAYER * layers.len();
-    // ν is at most ½: it is stepped downwards alone.
+    // ν is at most ½, so its step is negative only.
     let upper = |k: usize| if k < 2 * layers.len() { STEP } else { 0.0 };
     let moved = (0..count).map(|k| {
         let at = |value: f64| {
@@ -103,7 +104,7 @@ fn log_stiffness_gradient(guide: &Waveguide, radius_m: f64) -> Option<DVector<f6
         ([at(-STEP), at(upper(k))], upper(k) + STEP)
     });
     let mut slopes = DVector::from_vec(log_force_slopes(guide, radius_m, moved).ok()?);
-    // Of the touched layer as a half-space: ln E/(1 − ν²).
+    // The touched layer as a half-space: ln E/(1 − ν²).
     let touched = layers.iter().position(|layer| layer.thickness_m > 0.0)?;
     let nu = layers[touched].poisson_ratio;
     slopes[touched] += 1.0;
@@ -111,29 +112,30 @@ fn log_stiffness_gradient(guide: &Waveguide, radius_m: f64) -> Option<DVector<f6
     Some(slopes)
 }
 
-/// A guide with the errors of its layers, for contacts of every radius.
+/// A guide with the errors of its layers, for contacts of any radius.
 ///
-/// The derivatives of the stiffness by the layers' parameters are cubic in ln a between rows, which
-/// are solved when a contact first needs them: four at the first, then hardly any.
+/// The derivatives of the stiffness by the layers' parameters are interpolated by cubics in ln a
+/// between rows. A row is solved when a contact first needs it: four for the first contact, then
+/// hardly any.
 #[derive(Clone, Debug)]
 pub(crate) struct GuideErrors {
     guide: Waveguide,
-    /// Of ln E of all layers, then of ln h, then of ν.
+    /// Covariance of ln E of all layers, then of ln h, then of ν.
     covariance: DMatrix<f64>,
-    /// What one standard deviation of the size of a pixel does to each.
+    /// Change of each parameter per standard deviation of the pixel size.
     by_pixel_size: DVector<f64>,
     /// Derivatives by the parameters. `None` if the layer equation cannot be solved.
     rows: Vec<OnceLock<Option<DVector<f64>>>>,
 }
 
-// Ratios of contact radius to thickness from a half-space to the largest solved for, and the width
-// of a row in ln a. The cubic leaves 5·10⁻⁵ of an error (see the test).
+// Range of ratios of contact radius to thickness, from a half-space to the largest that is solved,
+// and the width of a row in ln a. The cubic has an error of 5·10⁻⁵ (see the test).
 const FIRST_RATIO: f64 = 1e-3;
 const LAST_RATIO: f64 = 20.0;
 const ROW: f64 = 0.2;
 
 impl GuideErrors {
-    /// Of matching sizes, which the caller has checked.
+    /// The sizes must match, which the caller has checked.
     pub(crate) fn new(
         guide: Waveguide,
         covariance: DMatrix<f64>,
@@ -154,8 +156,8 @@ impl GuideErrors {
         self.rows[k].get_or_init(solve).as_ref()
     }
 
-    /// The guide's compliance over the one stated, under a contact of radius a (m): one, with its
-    /// errors by [`Source::Guide`] and by [`Source::PixelSize`]. `None` if the layer equation
+    /// The guide's compliance relative to the stated one, for a contact of radius a (m): one, with
+    /// its errors by [`Source::Guide`] and [`Source::PixelSize`]. `None` if the layer equation
     /// cannot be solved.
     pub(crate) fn compliance(&self, radius_m: f64) -> Option<Uncertain> {
         let ratio = radius_m / self.guide.thickness_m();
@@ -195,7 +197,7 @@ impl GuideErrors {
     }
 }
 
-/// What is solved already is no part of the value.
+/// Rows that are already solved are not part of the value.
 impl PartialEq for GuideErrors {
     fn eq(&self, other: &Self) -> bool {
         let known = |errors: &Self| (errors.guide.clone(), errors.covariance.clone());

@@ -9,23 +9,23 @@ fn paper() -> Vec<Layer> {
     vec![layer(2e-3, 1.36e5), layer(3e-3, 8e4), layer(5e-3, 3.4e4)]
 }
 
-/// All moduli and all lengths scaled together leave a known trace.
+/// Scaling all moduli or all lengths together has a known effect.
 #[test]
 fn the_gradient_obeys_the_scaling_laws() {
     let layers = paper();
     let slopes = log_stiffness_gradient(&Waveguide::new(layers.clone()).unwrap(), 1.5e-3).unwrap();
-    // Twice the moduli, twice the stiffness.
+    // Twice the moduli mean twice the stiffness.
     let moduli: f64 = slopes.rows(0, 3).sum();
     assert!((moduli - 1.0).abs() < 1e-6, "{moduli}");
-    // Thicker layers under a contact as much larger: no change. So the slopes by ln h undo that by
-    // ln a.
+    // Scaling the layers and the contact together changes nothing, so the slopes by ln h cancel
+    // that by ln a.
     let [low, high] = [1.5e-3 / 1.001, 1.5e-3 * 1.001].map(|a| guide_log_stiffness(&layers, a));
     let by_radius = (high.unwrap() - low.unwrap()) / (2.0 * 1.001_f64.ln());
     let by_thickness: f64 = slopes.rows(3, 3).sum();
     assert!((by_radius + by_thickness).abs() < 1e-5);
 }
 
-/// The gradient comes from one solution of the integral equation. Here all are solved.
+/// The gradient uses one solution of the integral equation. Here all are solved.
 #[test]
 fn the_gradient_is_the_limit_of_differences() {
     for (a, layers) in [0.05e-3, 1.5e-3, 12e-3].iter().flat_map(|a| {
@@ -44,8 +44,8 @@ fn the_gradient_is_the_limit_of_differences() {
                 guide_log_stiffness(&stepped_layers(&layers, &step), a).unwrap()
             };
             let difference = (at(1e-3) - at(-1e-3)) / 2e-3;
-            // Differences leave some 1e-6. Those of ν in the gradient are downwards: half a step
-            // times a second derivative of up to ten times the first.
+            // Differences have an error of about 1e-6. For ν the gradient uses negative steps: half
+            // a step times a second derivative of up to ten times the first.
             let tolerance = if k < 2 * layers.len() {
                 1e-5
             } else {
@@ -60,7 +60,7 @@ fn the_gradient_is_the_limit_of_differences() {
     }
 }
 
-/// Rows serve every radius: beside the derivatives at the radius itself.
+/// Interpolation between rows agrees at every radius with the derivatives at that radius.
 #[test]
 fn errors_are_those_of_the_derivatives_at_every_radius() {
     let guide = Waveguide::new(paper()).unwrap();

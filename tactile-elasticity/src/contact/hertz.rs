@@ -5,14 +5,14 @@ use std::f64::consts::PI;
 
 /// A sphere pressed with a known force (Johnson 1985, *Contact Mechanics*, §4.2).
 ///
-/// a = (3FR/4E*)^⅓, δ = a²/R, p₀ = 3F/(2πa²), pressure p₀√(1 − r²/a²). Good for a/R up to about
-/// 0.3.
+/// a = (3FR/4E*)^⅓, δ = a²/R, p₀ = 3F/(2πa²), pressure p₀√(1 − r²/a²). It is accurate for a/R up to
+/// about 0.3.
 ///
 /// ```
 /// use tactile_elasticity::contact::HertzContact;
 /// let contact = HertzContact::from_force(0.05, 0.003, 26_666.7)?;
 /// assert!((contact.contact_radius_m - 1.6158e-3f64).abs() < 1e-7);
-/// // Far too large for Hertz: squeezed, not touched.
+/// // Far outside the range of Hertz: the ball is squeezed.
 /// assert!(contact.contact_radius_m / contact.radius_m > 0.5);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -27,9 +27,9 @@ pub struct HertzContact {
     pub reduced_modulus_pa: f64,
     /// a.
     pub contact_radius_m: f64,
-    /// δ, by which far points of the bodies approach.
+    /// Indentation δ, the approach of distant points of the bodies.
     pub indentation_m: f64,
-    /// p₀, in the centre.
+    /// Pressure p₀ at the centre.
     pub peak_pressure_pa: f64,
     /// F/(πa²) = ⅔ p₀.
     pub mean_pressure_pa: f64,
@@ -38,10 +38,12 @@ pub struct HertzContact {
 }
 
 impl HertzContact {
-    /// From force (N, zero allowed), relative radius (m) and reduced modulus (Pa).
+    /// Computes the contact from force (N, zero allowed), relative radius (m) and reduced modulus
+    /// (Pa).
     ///
     /// # Errors
-    /// [`ElasticityError::Negative`] force, [`ElasticityError::NotPositive`] radius or modulus.
+    /// [`ElasticityError::Negative`] for the force, [`ElasticityError::NotPositive`] for radius or
+    /// modulus.
     pub fn from_force(
         force_n: f64,
         radius_m: f64,
@@ -68,16 +70,16 @@ impl HertzContact {
 /// Normal displacement (m) at distance r of a half-space under p₀√(1 − r²/a²) (Johnson 1985, eq.
 /// 3.42).
 ///
-/// Inside π p₀(2a² − r²)/(4aE*). Outside p₀/(2aE*)·[(2a² − r²) asin(a/r) + a√(r² − a²)], which
-/// cancels as (r/a)² and is summed beyond r = 2a as ½ p₀ a/E* Σ 4 b_k (a/r)^(2k+1)/((2k+1)(2k+3)),
-/// b_k = (2k)!/(4ᵏ k!²): all terms positive.
+/// Inside the contact it is π p₀(2a² − r²)/(4aE*). Outside it is p₀/(2aE*)·[(2a² − r²) asin(a/r) +
+/// a√(r² − a²)]. Its terms cancel to (a/r)², so from r = 2a on it is summed as ½ p₀ a/E* Σ 4 b_k
+/// (a/r)^(2k+1)/((2k+1)(2k+3)) with b_k = (2k)!/(4ᵏ k!²), whose terms are all positive.
 ///
 /// ```
 /// use tactile_elasticity::contact::hertz_surface_displacement_m;
-/// // A distant point sees a point force: F/(π E* r), with F = ⅔ π a² p₀.
+/// // Far away the contact acts as a point force: F/(π E* r), with F = ⅔ π a² p₀.
 /// let far = hertz_surface_displacement_m(1e8, 1.0, 1.0, 1.0);
 /// assert!((far * 1e8 - 2.0f64 / 3.0).abs() < 1e-15);
-/// // Under a rigid sphere the rim has sunk half as deep as the centre.
+/// // Under a rigid sphere the rim sinks half as deep as the centre.
 /// let c = tactile_elasticity::contact::HertzContact::from_force(1e-3_f64, 5e-3, 50e3)?;
 /// let depth = |r| {
 ///     hertz_surface_displacement_m(r, c.contact_radius_m, c.peak_pressure_pa, 50e3)
@@ -105,7 +107,7 @@ pub fn hertz_surface_displacement_m(
     if x > 0.5 {
         let y = r / a;
         let chord = ((r - a) / a * ((r + a) / a)).sqrt();
-        // asin(a/r) through its tangent: near the rim a/r has lost what r − a keeps.
+        // asin(a/r) from its tangent: near the rim a/r loses digits that r − a keeps.
         return unit * 0.5 * ((2.0 - y * y) * 1f64.atan2(chord) + chord);
     }
     unit * 0.5 * far_series(x)
@@ -144,7 +146,7 @@ pub struct Body {
 }
 
 impl Body {
-    /// From Young's modulus (Pa) and Poisson's ratio.
+    /// Creates a body from Young's modulus (Pa) and Poisson's ratio.
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
@@ -176,7 +178,7 @@ impl Body {
 /// E* of two bodies, 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂, in Pa.
 ///
 /// # Errors
-/// [`ElasticityError::NotPositive`] where both are rigid.
+/// [`ElasticityError::NotPositive`] if both are rigid.
 ///
 /// ```
 /// use tactile_elasticity::contact::{Body, reduced_modulus_pa};

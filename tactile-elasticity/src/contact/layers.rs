@@ -1,14 +1,14 @@
-//! A sphere on layers with a rigid base: the integral equation solved.
+//! A sphere on layers with a rigid base: solution of the integral equation.
 //!
 //! With P(ξ) = ∫₀ᵃ φ(t) cos ξt dt for the transform of the pressure, the mixed boundary problem
-//! becomes Fredholm's equation of the second kind (Lebedev & Ufliand 1958)
+//! becomes a Fredholm equation of the second kind (Lebedev & Ufliand 1958)
 //!
 //! φ(s) − (2/π) ∫₀ᵃ K(s, t) φ(t) dt = (E*/π)(δ − s²/R),  K = ∫₀^∞ (1 − L(ξh)) cos ξs cos ξt dξ,
 //!
-//! with φ(a) = 0 where the pressure ends smoothly, and F = 2π ∫ φ. Both bodies may yield: with 1/E*
-//! the sum of the sphere's compliance and the touched layer's, the deficit 1 − L counts with the
-//! layer's share of it. K is analytic, so that Nyström's method on Gauss nodes converges
-//! exponentially.
+//! with φ(a) = 0 because the pressure ends smoothly, and F = 2π ∫ φ. Both bodies may be elastic:
+//! 1/E* is then the sum of the sphere's compliance and the touched layer's, and the deficit 1 − L
+//! is multiplied by the layer's share of it. K is analytic, so Nyström's method on Gauss nodes
+//! converges exponentially.
 
 use super::{Layer, Waveguide};
 use crate::error::{ElasticityError, Quantity, poisson};
@@ -16,12 +16,12 @@ use crate::numerics::{Chebyshev, cubic, gauss_legendre, gauss_panels, panel_edge
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix2x4, Matrix4, Matrix4x2, Vector4};
 use std::f64::consts::FRAC_2_PI;
 
-/// The contact of a sphere with layers at one ratio of contact radius to their thickness.
+/// The contact of a sphere with layers, for one ratio of contact radius to their thickness.
 ///
 /// ```
 /// use tactile_elasticity::contact::{Bond, LayerEquation};
 ///
-/// // A contact small beside the layer is Hertz's.
+/// // A contact that is small compared with the layer follows Hertz.
 /// let contact = LayerEquation::new(Bond::Bonded, 0.5)?.solve(1e-4)?;
 /// assert!(
 ///     (contact.force_ratio - 1.0_f64).abs() < 2e-4
@@ -33,7 +33,7 @@ use std::f64::consts::FRAC_2_PI;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct LayerContact {
-    /// a/h, h the thickness of all layers.
+    /// a/h, with h the thickness of all layers.
     pub a_over_h: f64,
     /// χ = √(Rδ)/h.
     pub chi: f64,
@@ -45,7 +45,7 @@ pub struct LayerContact {
     pub indentation_ratio: f64,
 }
 
-// The largest a/h solved for. Beyond, a thin-layer asymptote is the better theory.
+// Largest a/h that is solved. For larger ratios a thin-layer asymptote is the better theory.
 const LARGEST_A_OVER_H: f64 = 20.0;
 
 /// The contact of a sphere with layers on a rigid base.
@@ -53,7 +53,7 @@ const LARGEST_A_OVER_H: f64 = 20.0;
 /// ```
 /// use tactile_elasticity::contact::{Bond, Layer, LayerEquation, Waveguide};
 ///
-/// // A soft layer below makes a stiff one yield more than a rigid base does.
+/// // A soft layer below a stiff one yields more than a rigid base.
 /// let layer = |thickness_m, youngs_modulus_pa| Layer {
 ///     thickness_m,
 ///     youngs_modulus_pa,
@@ -76,7 +76,7 @@ pub struct LayerEquation {
 }
 
 impl LayerEquation {
-    /// Of one layer with Poisson ratio ν under a rigid sphere.
+    /// One layer with Poisson ratio ν under a rigid sphere.
     ///
     /// # Errors
     /// [`ElasticityError::PoissonRatio`].
@@ -84,23 +84,24 @@ impl LayerEquation {
         Ok(Self::of_kernel(&LayerKernel::new(bond, poisson_ratio)?))
     }
 
-    /// Of layers bonded to one another, the touched one first, under a rigid sphere. `bond` is that
-    /// of the lowest layer to the rigid base.
+    /// Layers bonded to one another, the touched one first, under a rigid sphere. `bond` is that of
+    /// the lowest layer to the rigid base.
     ///
     /// # Errors
-    /// [`ElasticityError::NotPositive`] thickness: a rigid waveguide has no layers.
+    /// [`ElasticityError::NotPositive`] for the thickness of a rigid waveguide, which has no
+    /// layers.
     pub fn of_layers(waveguide: &Waveguide, bond: Bond) -> Result<Self, ElasticityError> {
         Ok(Self::of_kernel(&LayerKernel::of_layers(waveguide, bond)?))
     }
 
-    /// With a sphere that yields too: `share` is the touched layer's part of 1/E*, in [0, 1].
+    /// Uses an elastic sphere: `share` is the touched layer's part of 1/E*, in [0, 1].
     ///
-    /// A share outside is taken as its nearer end.
+    /// A share outside this range is moved to the nearer end.
     ///
     /// ```
     /// use tactile_elasticity::contact::{Bond, LayerEquation};
     ///
-    /// // The more the sphere itself yields, the less the layer's depth matters.
+    /// // The softer the sphere, the less the depth of the layer matters.
     /// let layer = LayerEquation::new(Bond::Bonded, 0.5)?;
     /// let half = layer.clone().with_share(0.5).solve(1.0)?.force_ratio;
     /// assert!(1.0 < half && half < layer.solve(1.0)?.force_ratio);
@@ -123,11 +124,10 @@ impl LayerEquation {
         &self.kernel
     }
 
-    /// The contact at a/h. O(n³ + n² q) with n ≈ 24 + 6 a/h₁ nodes, h₁ the touched layer's
-    /// thickness, and some hundreds of wavenumbers q.
+    /// The contact at a/h. O(n³ + n² q) with n ≈ 24 + 6 a/h₁ nodes, where h₁ is the thickness of
+    /// the touched layer, and several hundred wavenumbers q.
     ///
-    /// # Errors
-    /// [`ElasticityError::NotPositive`], and [`ElasticityError::OutOfRange`] beyond a/h = 20.
+    /// [`ElasticityError::NotPositive`], and [`ElasticityError::OutOfRange`] for a/h above 20.
     ///
     /// ```
     /// use tactile_elasticity::contact::{Bond, LayerEquation};
@@ -142,16 +142,16 @@ impl LayerEquation {
     }
 }
 
-/// The kernel on the nodes of one a/h, which serves every share.
+/// The kernel on the nodes for one a/h, valid for every share.
 struct DiscreteKernel {
     a_over_h: f64,
     /// Gauss nodes on [0, 1] with their weights.
     rule: Vec<(f64, f64)>,
     /// Wavenumbers s with the weights of an integral over them.
     wavenumbers: Vec<(f64, f64)>,
-    /// cos(sρσ) at the nodes σ and the wavenumbers s. The last row is that of the rim, σ = 1.
+    /// cos(sρσ) at the nodes σ and the wavenumbers s. The last row belongs to the rim, σ = 1.
     cosines: DMatrix<f64>,
-    /// ∫(1 − L) cos(uρσ) cos(uρτ) du at the nodes σ, τ. The last row is that of the rim, σ = 1.
+    /// ∫(1 − L) cos(uρσ) cos(uρτ) du at the nodes σ, τ. The last row belongs to the rim, σ = 1.
     values: DMatrix<f64>,
 }
 
@@ -161,9 +161,9 @@ impl DiscreteKernel {
         if a_over_h > LARGEST_A_OVER_H {
             return Err(out_of_range(a_over_h));
         }
-        // The pressure bends within h₁ of the rim: six nodes for that length leave 10⁻⁹. A skin
-        // thinner than a/40 is smoothed over rather than paid for with the third power of its
-        // nodes.
+        // The pressure bends within h₁ of the rim: six nodes over this length leave an error of
+        // 10⁻⁹. A skin thinner than a/40 is smoothed, because the cost is the third power of the
+        // number of nodes.
         let per_top_layer = (a_over_h / kernel.top_thickness()).min(40.0);
         let rule = gauss_legendre(24 + (6.0 * per_top_layer) as usize);
         let wavenumbers = kernel.wavenumbers(a_over_h);
@@ -187,8 +187,8 @@ impl DiscreteKernel {
         })
     }
 
-    /// φ for the right sides 1, s² and K(1, s), a column each: a flat punch, the sphere's roundness,
-    /// and what moves the rim.
+    /// φ for the right sides 1, s² and K(1, s), one column each: a flat punch, the curvature of the
+    /// sphere, and a shift of the rim.
     fn solutions(&self, share: f64) -> Result<Solutions, ElasticityError> {
         let (rule, kernel) = (&self.rule, &self.values);
         let n = rule.len();
@@ -204,7 +204,7 @@ impl DiscreteKernel {
         let phi = matrix.lu().solve(&right);
         let phi = phi.ok_or(out_of_range(self.a_over_h))?;
         let integral = |side: usize| (0..n).map(|j| rule[j].1 * phi[(j, side)]).sum::<f64>();
-        // φ at the rim by Nyström's own interpolation. The last row of the kernel belongs to s = a.
+        // φ at the rim by Nyström interpolation. The last row of the kernel belongs to s = a.
         let rim = |side: usize| {
             let integral = (0..n).map(|j| kernel[(n, j)] * rule[j].1 * phi[(j, side)]);
             1.0 + scale * integral.sum::<f64>()
@@ -217,7 +217,7 @@ impl DiscreteKernel {
         })
     }
 
-    /// The contact with the touched layer's part of 1/E*.
+    /// The contact if `share` is the touched layer's part of 1/E*.
     fn contact(&self, share: f64) -> Result<LayerContact, ElasticityError> {
         let solutions = self.solutions(share)?;
         let ratio = solutions.indentation_ratio();
@@ -231,19 +231,20 @@ impl DiscreteKernel {
         })
     }
 
-    /// What a change of the deficit by one at each wavenumber, with its weight, does to ln F at the
-    /// same contact radius, the sphere rigid.
+    /// Change of ln F at constant contact radius under a rigid sphere, per unit change of the
+    /// deficit at each wavenumber, times its weight.
     ///
-    /// The kernel is symmetric. To first order a change dK of it moves ∫φ of a right side b by
-    /// ⟨g, dK φ⟩ with g the solution of a flat punch, and φ at the rim by ⟨K(1, ·)'s solution and
-    /// the rim itself, dK φ⟩. Together F moves by 1.5 ⟨g − p ∫g/g(1), dK (ρg − r)⟩, with ρg − r the
-    /// φ of the contact. By wavenumbers dK is diagonal.
+    /// The kernel is symmetric. To first order, a change dK of the kernel changes ∫φ of a right
+    /// side b by ⟨g, dK φ⟩, with g the solution of a flat punch. It changes φ at the rim by dK φ
+    /// projected on the solution of K(1, ·) and on the rim itself. Together, ln F changes by 1.5 ⟨g
+    /// − p ∫g/g(1), dK (ρg − r)⟩, with ρg − r the φ of the contact. By wavenumbers dK is diagonal.
     fn log_force_by_deficit(&self) -> Result<Vec<f64>, ElasticityError> {
         let solutions = self.solutions(1.0)?;
         let n = self.rule.len();
         let by_rim = solutions.integrals[0] / solutions.rims[0];
         let ratio = solutions.indentation_ratio();
-        // Cosine transforms of both factors: weights of the nodes' cosines, then of the rim's.
+        // Cosine transforms of both factors: weights for the cosines of the nodes, then for that of
+        // the rim.
         let factor = |of: &dyn Fn(f64, f64, f64) -> f64, rim: f64| {
             DVector::from_fn(n + 1, |i, _| match self.rule.get(i) {
                 Some((_, w)) => {
@@ -262,12 +263,12 @@ impl DiscreteKernel {
     }
 }
 
-/// Solutions of the integral equation, by [`DiscreteKernel::solutions`].
+/// Solutions of the integral equation from [`DiscreteKernel::solutions`].
 struct Solutions {
     /// (2/π) a/h times the share.
     scale: f64,
     phi: DMatrix<f64>,
-    /// Of the first two: integrals over \[0, 1\], and values at the rim.
+    /// For the first two: integrals over \[0, 1\], and values at the rim.
     integrals: [f64; 2],
     rims: [f64; 2],
 }
@@ -284,9 +285,9 @@ impl Solutions {
     }
 }
 
-/// Derivatives of ln F of a rigid sphere's contact of radius a (m), F over what the touched layer
-/// alone would bear as a half-space, by parameters of the layers. Each of `moved` holds the layers
-/// with one parameter lower and higher, and by how much these differ.
+/// Derivatives of ln F by parameters of the layers, for a rigid sphere with a contact of radius a
+/// (m). F is relative to the force on a half-space of the touched layer. Each entry of `moved`
+/// holds the layers with one parameter lower and higher, and the difference of the two values.
 ///
 /// # Errors
 /// Those of [`LayerEquation::solve`].
@@ -315,17 +316,18 @@ fn out_of_range(found: f64) -> ElasticityError {
     Quantity::ContactRadius.beyond(found, LARGEST_A_OVER_H)
 }
 
-// How much stiffer than a half-space layers on a rigid base are, by wavenumber.
+// The stiffness of layers on a rigid base relative to a half-space, by wavenumber.
 //
-// Under a pressure of wavenumber ξ a half-space yields by 2p/(E*ξ). Layers of total thickness h by
-// L(ξh) times that, with E* of the touched one: L → 0 for long waves and 1 for short ones.
+// Under a pressure of wavenumber ξ the surface of a half-space is displaced by 2p/(E*ξ). For layers
+// of total thickness h it is L(ξh) times this, with E* of the touched layer: L → 0 for long waves
+// and L → 1 for short ones.
 
-/// How the layer sits on its rigid base.
+/// Bond of the layer to its rigid base.
 ///
 /// ```
 /// use tactile_elasticity::contact::{Bond, LayerEquation};
 ///
-/// // Bonded to its base a layer is stiffer than one that slides.
+/// // A layer that is bonded to its base is stiffer than one that slides.
 /// let ratio = |bond| LayerEquation::new(bond, 0.5)?.solve(1.0).map(|contact| contact.force_ratio);
 /// assert!(ratio(Bond::Bonded)? > 1.5 * ratio(Bond::Free)?);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -336,20 +338,20 @@ pub enum Bond {
     /// No displacement at the base.
     #[default]
     Bonded,
-    /// The base holds the layer down but not sideways: it slides without friction.
+    /// The base supports the layer, which slides on it without friction.
     Free,
 }
 
-/// The deficit 1 − L(s) of layers on a rigid base, s = ξh with h their total thickness.
+/// The deficit 1 − L(s) of layers on a rigid base, with s = ξh and h the total thickness.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LayerKernel {
-    /// The touched one first. Never empty.
+    /// Layers, the touched one first. Never empty.
     layers: Vec<StackLayer>,
     bond: Bond,
 }
 
 impl LayerKernel {
-    /// Of one layer with Poisson ratio ν.
+    /// One layer with Poisson ratio ν.
     ///
     /// # Errors
     /// [`ElasticityError::PoissonRatio`].
@@ -365,17 +367,18 @@ impl LayerKernel {
         })
     }
 
-    /// Of layers bonded to one another, the touched one first. `bond` is that of the lowest to the
-    /// rigid base.
+    /// Layers bonded to one another, the touched one first. `bond` is that of the lowest layer to
+    /// the rigid base.
     ///
     /// # Errors
-    /// [`ElasticityError::NotPositive`] thickness: a rigid waveguide has no layers.
+    /// [`ElasticityError::NotPositive`] for the thickness of a rigid waveguide, which has no
+    /// layers.
     pub(crate) fn of_layers(waveguide: &Waveguide, bond: Bond) -> Result<Self, ElasticityError> {
         let total = Quantity::Thickness.positive(waveguide.thickness_m())?;
         Ok(Self::in_units_of(total, waveguide.layers(), bond))
     }
 
-    /// Of layers that are not all without thickness, s = ξ times this length.
+    /// Layers with a thickness above zero in total. s is ξ times `unit_m`.
     fn in_units_of(unit_m: f64, layers: &[Layer], bond: Bond) -> Self {
         let layers: Vec<_> = layers
             .iter()
@@ -395,12 +398,12 @@ impl LayerKernel {
         Self { layers, bond }
     }
 
-    /// 1 − L(s): how much less the surface yields at s = kh than a half-space of the touched layer,
-    /// over what that yields. 1 for long waves, 0 for short ones. Below zero where a soft layer
-    /// lies under a stiff one.
+    /// 1 − L(s): the relative reduction of the surface compliance at s = kh compared with a
+    /// half-space of the touched layer. It is 1 for long waves and 0 for short ones, and negative
+    /// if a soft layer lies under a stiff one.
     pub(super) fn deficit(&self, s: f64) -> f64 {
         let Some((top, lower)) = self.layers.split_first().filter(|_| s > 1e-9) else {
-            return 1.0; // long waves move nothing
+            return 1.0; // long waves displace nothing
         };
         let mut below = Face::Base(self.bond);
         for layer in lower.iter().rev() {
@@ -415,16 +418,16 @@ impl LayerKernel {
         }
     }
 
-    /// Thickness of the touched layer over the total.
+    /// Thickness of the touched layer relative to the total.
     fn top_thickness(&self) -> f64 {
         self.layers[0].thickness
     }
 
-    /// Nodes s and weights of ∫(1 − L(s)) ds, for integrands that turn as fast as cos²(s·x).
+    /// Nodes s and weights of ∫(1 − L(s)) ds, for integrands that oscillate as fast as cos²(s·x).
     pub(super) fn wavenumbers(&self, x: f64) -> Vec<(f64, f64)> {
-        // The deficit falls as s²e^(−2s) in units of the touched layer: at 25 it is below 10⁻¹⁸.
+        // The deficit decays as s²e^(−2s) in units of the touched layer: at 25 it is below 10⁻¹⁸.
         let end = 25.0 / self.top_thickness();
-        // Sixteen Gauss points resolve a decay by e⁻⁵ and an argument of 16 to the last digits.
+        // Sixteen Gauss points resolve a decay by e⁻⁵ and an argument of 16 to the last digit.
         let widest = (2.5 / self.top_thickness()).min(8.0 / x.max(f64::MIN_POSITIVE));
         gauss_panels(&panel_edges(end, 0.5, widest))
     }
@@ -432,21 +435,22 @@ impl LayerKernel {
 
 // The surface of bonded elastic layers under a pressure wave.
 //
-// Under a normal traction p̂ J₀(kr) every layer deforms as W(z) J₀(kr), U(z) J₁(kr) with the
-// tractions Σ and T, in units of 2kG. With y = kz growing upwards the state v = (W, U, Σ, T) obeys
-// dv/dy = Mv,
+// Under a normal traction p̂ J₀(kr) each layer deforms as W(z) J₀(kr), U(z) J₁(kr) with the
+// tractions Σ and T, in units of 2kG. With y = kz pointing upwards, the state v = (W, U, Σ, T)
+// obeys dv/dy = Mv,
 //
 // Ẇ = −nU + (1 − n)Σ,  U̇ = W + 2T,  Σ̇ = −T,  Ṫ = (1 + n)U + nΣ,  n = ν/(1 − ν),
 //
-// in which nothing is singular at ν = ½. As (M² − 1)² = 0, the transfer matrix exp(yM) is a cubic
-// in M. It is not chained, which would lose all digits at large y. Instead the compliance F with
-// (W, U) = F (Σ, T) is carried from the base to the surface, layer by layer: the growing waves
-// dominate numerator and denominator alike, and their ratio keeps its digits at every kh.
+// which is regular at ν = ½. As (M² − 1)² = 0, the transfer matrix exp(yM) is a cubic in M. It is
+// not chained, because this would lose all digits at large y. Instead the compliance F with (W, U)
+// = F (Σ, T) is propagated from the base to the surface, layer by layer: the growing waves dominate
+// numerator and denominator alike, and their ratio keeps its digits at every kh.
 //
-// Where the touched layer is deep beside the wave, 1 − L is small and would be rounding alone.
-// There the wave that its lower face sends back, e^(−2y) times a reflection, gives 1 − L itself.
+// If the touched layer is deep compared with the wave, 1 − L is small and would consist of rounding
+// alone. There the wave reflected by its lower face, e^(−2y) times a reflection coefficient, gives
+// 1 − L directly.
 
-/// A layer in units of the stack's thickness and of the top layer's shear modulus.
+/// A layer in units of the total thickness and of the top layer's shear modulus.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct StackLayer {
     thickness: f64,
@@ -454,10 +458,10 @@ struct StackLayer {
     poisson_ratio: f64,
 }
 
-// Beyond this kh a layer is a half-space to the last digit: what lies below counts with y²e^(−2y).
+// Above this kh a layer is a half-space to the last digit: the layers below contribute y²e^(−2y).
 const DEEP: f64 = 30.0;
 
-/// What a layer's lower face lies on.
+/// The support of a layer's lower face.
 enum Face {
     Base(Bond),
     /// Layers with this compliance, in units of the touched layer's modulus.
@@ -473,7 +477,7 @@ impl StackLayer {
         }
         let identity = Matrix2::identity();
         let normal = Matrix2::new(1.0, 0.0, 0.0, 0.0);
-        // Displacements and tractions of two independent solutions at the lower face, a column
+        // Displacements and tractions of two independent solutions at the lower face, one column
         // each.
         let (displacements, tractions) = match below {
             Face::Compliant(compliance) => (*compliance, identity),
@@ -486,9 +490,9 @@ impl StackLayer {
         displacements * inverse(tractions)
     }
 
-    /// F of a half-space of this layer less F at its upper face: e^(−2y)(D − F T)ρ(T₀ + e^(−2y)
-    /// Tρ)⁻¹, D and T the displacements and tractions of the waves that decay upwards, T₀ of those
-    /// that grow, ρ the reflection at the lower face.
+    /// F of a half-space of this layer minus F at its upper face: e^(−2y)(D − F T)ρ(T₀ + e^(−2y)
+    /// Tρ)⁻¹. D and T are the displacements and tractions of the waves that decay upwards, T₀ those
+    /// of the waves that grow, and ρ is the reflection at the lower face.
     fn less_than_half_space(&self, y: f64, below: &Face) -> Matrix2<f64> {
         let unit = self.shear_modulus;
         // The two rows that vanish at the lower face.
@@ -509,8 +513,7 @@ impl StackLayer {
         (displacements - self.half_space() * tractions) * inverse(growing - tractions)
     }
 
-    /// The two waves that decay upwards, at height y above where they are counted from, less their
-    /// e^(−y).
+    /// The two waves that decay upwards, at height y above their origin, without the factor e^(−y).
     fn decaying(&self, y: f64) -> Matrix4x2<f64> {
         let nu = self.poisson_ratio;
         let w = Vector4::new(1.0, 1.0, -1.0, -1.0);
@@ -523,7 +526,7 @@ impl StackLayer {
         Matrix4x2::from_columns(&[w, yw])
     }
 
-    /// The two waves that grow upwards, at height y, less their e^y.
+    /// The two waves that grow upwards, at height y, without the factor e^y.
     fn growing(&self, y: f64) -> Matrix4x2<f64> {
         let nu = self.poisson_ratio;
         let w = Vector4::new(1.0, -1.0, 1.0, -1.0);
@@ -564,12 +567,13 @@ impl StackLayer {
     }
 }
 
-/// e^(−y) (y cosh y − sinh y), which is y³/3 where y is small and the terms cancel.
+/// e^(−y) (y cosh y − sinh y), replaced by a series that starts with y³/3 for small y, where the
+/// terms cancel.
 fn y_cosh_less_sinh(y: f64, cosh: f64, sinh: f64) -> f64 {
     if y > 0.5 {
         return y * cosh - sinh;
     }
-    // Σ 2k y^(2k+1)/(2k+1)!. At y = ½ the first term left out is 10⁻¹⁷ of the sum.
+    // Σ 2k y^(2k+1)/(2k+1)!. At y = ½ the first neglected term is 10⁻¹⁷ of the sum.
     let square = y * y;
     let tail = 1.0 + square / 54.0 * (1.0 + square / 88.0 * (1.0 + square / 130.0));
     let series = 1.0 + square / 10.0 * (1.0 + square / 28.0 * tail);
@@ -583,22 +587,22 @@ fn stacked(upper: Matrix2<f64>, lower: Matrix2<f64>) -> Matrix4x2<f64> {
     rows
 }
 
-/// Of tractions or conditions that belong to independent solutions: a load has one answer, so that
-/// the inverse exists.
+/// Inverse of tractions or conditions of independent solutions. It exists because a load has one
+/// solution.
 fn inverse(matrix: Matrix2<f64>) -> Matrix2<f64> {
     matrix.try_inverse().unwrap_or_else(Matrix2::zeros)
 }
 
-/// What a contact of given a/h is beside Hertz's of the same radius, with slopes in ln a.
+/// A contact of given a/h relative to Hertz's with the same radius, with slopes in ln a.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SharedContact {
-    /// ln of the force over Hertz's, and its slope.
+    /// ln of the force relative to Hertz's, and its slope.
     pub(crate) force: [f64; 2],
-    /// ln of the indentation over Hertz's, and its slope.
+    /// ln of the indentation relative to Hertz's, and its slope.
     pub(crate) indentation: [f64; 2],
 }
 
-/// Contacts of a sphere that yields with the layers: cubic in ln(a/h), Chebyshev in the touched
+/// Contacts of an elastic sphere with the layers: cubic in ln(a/h), Chebyshev in the touched
 /// layer's share of 1/E*.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SharedLayerTable {
@@ -606,10 +610,12 @@ pub(crate) struct SharedLayerTable {
     rows: Vec<Row>,
 }
 
-// Twelve shares leave 10⁻⁷ at a/h = 3 (see the test). Each costs one factorisation a row.
+// Twelve shares leave an error of 10⁻⁷ at a/h = 3 (see the test). Each costs one factorisation per
+// row.
 const SHARES: usize = 12;
 
-// Width of a row in ln a. The cubic's error goes as its fourth power and is 5·10⁻⁶ here.
+// Width of a row in ln a. The error of the cubic is proportional to its fourth power, and is 5·10⁻⁶
+// here.
 const STEP: f64 = 0.1;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -619,8 +625,8 @@ struct Row {
 }
 
 impl SharedLayerTable {
-    /// For a/h in `range`, the upper end at most [`LARGEST_A_OVER_H`]. None where a row cannot be
-    /// solved.
+    /// A table for a/h in `range`, whose upper end is at most [`LARGEST_A_OVER_H`]. `None` if a row
+    /// cannot be solved.
     pub(crate) fn new(kernel: &LayerKernel, range: (f64, f64)) -> Option<Self> {
         let (first, last) = (range.0.ln(), range.1.min(LARGEST_A_OVER_H).ln());
         let count = ((last - first) / STEP).ceil().max(3.0) as usize + 1;
@@ -629,7 +635,7 @@ impl SharedLayerTable {
         Some(Self { first, rows: rows? })
     }
 
-    /// At a/h and a share in [0, 1]. None beyond the table.
+    /// The contact at a/h and a share in [0, 1]. `None` outside the table.
     pub(crate) fn at(&self, a_over_h: f64, share: f64) -> Option<SharedContact> {
         let (rows, at) = (&self.rows, a_over_h.ln());
         let place = (at - self.first) / STEP;
@@ -637,7 +643,7 @@ impl SharedLayerTable {
             return None;
         }
         if place < 0.0 {
-            // A contact that is small beside the layer: ln(1 + c a) ≈ c a.
+            // The contact is small compared with the layer: ln(1 + c a) ≈ c a.
             let shrink = (at - self.first).exp();
             let (force, indentation) = rows[0].at(share);
             return Some(SharedContact {

@@ -10,8 +10,9 @@ fn without_a_share_the_layer_does_not_matter() {
 
 #[test]
 fn gauss_nodes_are_enough() {
-    // The force of a layer 20 times thinner than the contact changes by less than 10⁻⁹ with one
-    // more node: compare with the solution at nearly the same a/h, whose node count differs.
+    // The force on a layer 20 times thinner than the contact changes by less than 10⁻⁹ with one
+    // more node. The test compares with the solution at nearly the same a/h, which has another
+    // number of nodes.
     let equation = LayerEquation::new(Bond::Bonded, 0.3).unwrap();
     let (a, b) = (
         equation.solve(5.0 - 1e-9).unwrap(),
@@ -55,8 +56,8 @@ fn one_layer_has_its_closed_form_and_may_be_cut() {
                 let exact = closed_form(s, nu, bond);
                 let whole = one.deficit(s) / exact - 1.0;
                 assert!(whole.abs() < 1e-12, "{nu} {bond:?} {s}: {whole:e}");
-                // Thin layers are stiff: y = 10⁻⁵ takes some digits. A part's digits are those of
-                // what its lower face returns.
+                // Thin layers are stiff, and y = 10⁻⁵ costs several digits. The accuracy of a part
+                // is that of the wave reflected by its lower face.
                 let parts = cut.deficit(s) - exact;
                 let tolerance = 1e-9 * exact + 1e-11 * (-2.0 * 0.301 * s).exp();
                 assert!(parts.abs() < tolerance, "{nu} {bond:?} {s}: {parts:e}");
@@ -75,7 +76,7 @@ fn short_waves_see_the_top_and_a_stiff_base_is_rigid() {
     let on_steel = kernel(&on_steel, Bond::Bonded);
     for s in [2.0, 7.0, 60.0] {
         let thin = closed_form(s * 0.2, 0.45, Bond::Bonded);
-        // Steel yields by 10⁻⁹ of the layer.
+        // Steel yields by 10⁻⁹ of the layer's displacement.
         assert!((on_steel.deficit(s) / thin - 1.0).abs() < 1e-7, "{s}");
     }
 }
@@ -105,7 +106,7 @@ fn shares_and_radii_between_the_nodes() {
             let exact = equation.clone().with_share(share);
             let exact = exact.solve(a).unwrap();
             let found = table.at(a, share).unwrap();
-            // Below the table the correction is taken as linear in a: its square is left out.
+            // Below the table the correction is assumed linear in a, and its square is neglected.
             let tolerance = if a < 0.01 { 3e-5 } else { 1e-5 };
             let force_gap = found.force[0] - exact.force_ratio_same_radius.ln();
             let indentation_gap = found.indentation[0] - exact.indentation_ratio.ln();

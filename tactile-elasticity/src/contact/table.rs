@@ -4,19 +4,20 @@ use super::{Layer, Waveguide};
 use crate::error::{ElasticityError, Quantity, poisson};
 use nalgebra::{DMatrix, DVector};
 
-/// Force over contact radius and modulus for a ball of one radius on one guide, or on a rigid flat.
+/// Force as a function of contact radius and modulus, for a ball of one radius on one guide or on a
+/// rigid flat.
 ///
-/// With Hertz's force on a rigid flat taken out, $\ln[F / (\frac{4}{3} \frac{E}{1 - \nu^2}
+/// Relative to Hertz's force on a rigid flat, $\ln[F / (\frac{4}{3} \frac{E}{1 - \nu^2}
 /// \frac{a^3}{R})]$ is a product of polynomials in a/R and ln E, fitted to all contacts by least
-/// squares. F must grow with a and E everywhere between them.
-/// [`interpolation_error`](Self::interpolation_error) is what the fit misses. With the feature
-/// `fem` `solve` computes one by finite elements.
+/// squares. F must increase with a and E everywhere in the table.
+/// [`interpolation_error`](Self::interpolation_error) is the error of the fit. With the feature
+/// `fem`, `solve` computes a table by finite elements.
 ///
 /// ```
 /// use tactile_elasticity::contact::{ContactCurve, ContactTable, Waveguide};
 ///
-/// // Hertz's contacts of a ball of 3 mm on a rigid flat: forces are in proportion to the modulus,
-/// // one curve is enough.
+/// // Hertz's contacts of a ball of 3 mm on a rigid flat. Forces are proportional to the modulus,
+/// // so one curve is enough.
 /// let contact_radius_m: Vec<f64> = (1..=10).map(|k| 0.1e-3 * f64::from(k)).collect();
 /// let force_n = contact_radius_m
 ///     .iter()
@@ -48,19 +49,19 @@ pub struct ContactTable {
     limits: Limits,
 }
 
-/// What the table covers.
+/// Range of the table.
 #[derive(Debug, Clone, PartialEq)]
 struct Limits {
     smallest_ratio: f64,
-    /// ln E and the largest a/R of each curve: a stiff ball sinks in before its contact is as large
-    /// as a soft one's.
+    /// ln E and the largest a/R of each curve: a stiff ball sinks in before its contact becomes as
+    /// large as that of a soft ball.
     largest_ratio: Vec<(f64, f64)>,
-    /// ln E. All reals on a rigid flat.
+    /// Range of ln E. Unbounded on a rigid flat.
     log_modulus: [f64; 2],
 }
 
 impl Limits {
-    /// The largest a/R at ln E, between curves linear.
+    /// The largest a/R at ln E, linearly interpolated between curves.
     fn largest_ratio(&self, log_modulus: f64) -> f64 {
         let curves = &self.largest_ratio;
         let next = curves.partition_point(|c| c.0 < log_modulus);
@@ -73,7 +74,7 @@ impl Limits {
     }
 }
 
-/// ln F of a contact and its slopes.
+/// ln F of a contact with its slopes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TabulatedForce {
     pub(crate) log_force: f64,
@@ -83,22 +84,22 @@ pub(crate) struct TabulatedForce {
     pub(crate) modulus_slope: f64,
 }
 
-// Limits are met by numbers that rounding moved by this.
+// Tolerance of limits for values changed by rounding.
 const ROUNDING: f64 = 1e-12;
 
-// How much smaller than its smallest a contact may be: ln(F/F_Hertz) is some −0.1 a/R there, and
-// is taken on along its tangent.
+// Smallest contact relative to the smallest in the table. ln(F/F_Hertz) is about −0.1 a/R there,
+// and is extrapolated along its tangent.
 const SMALLER: f64 = 0.6;
 
 impl ContactTable {
-    /// From curves of growing modulus for a ball of radius R (m) and Poisson ratio ν on a guide, or
-    /// on a [rigid](Waveguide::rigid) flat.
+    /// Creates a table from curves of increasing modulus, for a ball of radius R (m) and Poisson
+    /// ratio ν on a guide or on a [rigid](Waveguide::rigid) flat.
     ///
     /// # Errors
-    /// R, ν, a modulus, a contact radius or a force that is not valid or does not grow. Fewer than
-    /// four contacts of a modulus, or than two moduli on a guide that yields.
-    /// [`ElasticityError::NotMonotone`] where the fitted force does not grow with contact radius
-    /// and modulus.
+    /// An error for a value of R, ν, a modulus, a contact radius or a force that is invalid or does
+    /// not increase, for fewer than four contacts per modulus, and for fewer than two moduli on a
+    /// compliant guide. [`ElasticityError::NotMonotone`] if the fitted force does not increase with
+    /// contact radius and modulus.
     pub fn new(
         radius_m: f64,
         poisson_ratio: f64,
@@ -154,24 +155,24 @@ impl ContactTable {
         self.poisson_ratio
     }
 
-    /// The guide's layers, the touched one first. None on a rigid flat.
+    /// The guide's layers, the touched one first. Empty on a rigid flat.
     pub fn layers(&self) -> &[Layer] {
         &self.layers
     }
 
-    /// The contacts that the table is made of, a curve a modulus.
+    /// The contacts of the table, one curve per modulus.
     pub fn curves(&self) -> &[ContactCurve] {
         &self.curves
     }
 
-    /// Root mean square relative error of the interpolated force: what each contact of the table
-    /// misses when it is left out, but for those at the ends of the curves and of the softest and
-    /// the stiffest ball, where that would show how well the fit extrapolates.
+    /// Root mean square relative error of the interpolated force, by leaving out one contact at a
+    /// time. The ends of the curves and the softest and stiffest ball are not left out, because
+    /// this would measure extrapolation.
     pub fn interpolation_error(&self) -> f64 {
         self.surface.error
     }
 
-    /// The force in newtons at a contact radius (m) and a modulus (Pa). None outside the table.
+    /// The force in newtons at a contact radius (m) and a modulus (Pa). `None` outside the table.
     pub fn force_n(&self, contact_radius_m: f64, youngs_modulus_pa: f64) -> Option<f64> {
         let log_modulus = youngs_modulus_pa.ln();
         let [softest, stiffest] = self.limits.log_modulus;
@@ -181,14 +182,15 @@ impl ContactTable {
         covered.then(|| self.at(contact_radius_m, log_modulus).log_force.exp())
     }
 
-    /// Whether a contact radius lies between the smallest and the largest at ln E.
+    /// Whether a contact radius is between the smallest and the largest at ln E.
     pub(crate) fn covers(&self, a: f64, log_modulus: f64) -> bool {
         let [smallest, largest] = self.contact_ratios(log_modulus);
         let ratio = a / self.radius_m;
         ratio >= smallest * (1.0 - ROUNDING) && ratio <= largest * (1.0 + ROUNDING)
     }
 
-    /// The force. Beyond the computed contact radii at this ln E continued along the tangent.
+    /// The force. Outside the computed contact radii at this ln E it is extrapolated along the
+    /// tangent.
     pub(crate) fn at(&self, a: f64, log_modulus: f64) -> TabulatedForce {
         let [smallest, largest] = self.contact_ratios(log_modulus);
         let ratio = a / self.radius_m;
@@ -204,7 +206,7 @@ impl ContactTable {
         }
     }
 
-    /// ln E of the smallest and the largest modulus, without bounds on a rigid flat.
+    /// ln E of the smallest and the largest modulus. Unbounded on a rigid flat.
     pub(crate) fn log_moduli(&self) -> [f64; 2] {
         self.limits.log_modulus
     }
@@ -217,7 +219,7 @@ impl ContactTable {
         ]
     }
 
-    /// Refuses another ball or guide than the table's.
+    /// Rejects a ball or guide other than that of the table.
     pub(crate) fn check_made_for(
         &self,
         radius_m: f64,
@@ -225,7 +227,7 @@ impl ContactTable {
         guide: &Waveguide,
     ) -> Result<(), ElasticityError> {
         let same = |found: f64, expected: f64, quantity| {
-            // Numbers that went through a text file, or through millimetres, keep this.
+            // Numbers that passed through a text file, or through millimetres, keep this accuracy.
             if (found - expected).abs() <= 1e-9 * expected.abs() {
                 Ok(())
             } else {
@@ -253,7 +255,7 @@ impl ContactTable {
         Ok(())
     }
 
-    /// Steps of the check between neighbouring limits.
+    /// Number of checked points between neighbouring limits.
     const CHECKED: usize = 40;
 
     fn check_monotone(&self) -> Result<(), ElasticityError> {
@@ -281,13 +283,13 @@ impl ContactTable {
     }
 }
 
-/// ln of Hertz's force of contact radius a on a rigid flat, 4/3 E/(1 − ν²) a³/R.
+/// ln of Hertz's force for contact radius a on a rigid flat, 4/3 E/(1 − ν²) a³/R.
 fn log_hertz(a: f64, log_modulus: f64, radius_m: f64, poisson_ratio: f64) -> f64 {
     let shape = 4.0 / 3.0 * a.powi(3) / (radius_m * (1.0 - poisson_ratio * poisson_ratio));
     log_modulus + shape.ln()
 }
 
-/// The table as files hold it.
+/// The file format of the table.
 #[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -300,7 +302,7 @@ struct TableFile {
     curves: Vec<ContactCurve>,
 }
 
-/// Raised whenever a file's meaning changes.
+/// Incremented whenever the meaning of the format changes.
 #[cfg(feature = "serde")]
 const VERSION: u32 = 1;
 
@@ -337,8 +339,8 @@ impl TryFrom<TableFile> for ContactTable {
     }
 }
 
-/// The contacts of one ball under growing loads, of [`ContactTable`](super::ContactTable)'s
-/// example: columns of equal length.
+/// The contacts of one ball under increasing loads, as in the example of
+/// [`ContactTable`](super::ContactTable): columns of equal length.
 ///
 /// ```
 /// use tactile_elasticity::contact::ContactCurve;
@@ -356,14 +358,14 @@ impl TryFrom<TableFile> for ContactTable {
 pub struct ContactCurve {
     /// E of the ball, in pascals.
     pub youngs_modulus_pa: f64,
-    /// Contact radii, growing, in metres.
+    /// Contact radii in ascending order, in metres.
     pub contact_radius_m: Vec<f64>,
-    /// The force at each, in newtons.
+    /// The force at each contact radius, in newtons.
     pub force_n: Vec<f64>,
 }
 
 impl ContactCurve {
-    /// Fewest contacts of a curve.
+    /// Minimum number of contacts in a curve.
     pub const FEWEST_CONTACTS: usize = 4;
 
     fn check(&self) -> Result<(), ElasticityError> {
@@ -386,24 +388,24 @@ impl ContactCurve {
     }
 }
 
-// Degree in a/R and the largest in ln E: what they leave of contacts that finite elements computed
-// is the elements' own scatter in the contact radius, some 0.1 %
+// Degree in a/R and maximum degree in ln E. The residuals for contacts computed by finite elements
+// are the scatter of the elements in the contact radius, about 0.1 %
 // (`the_surface_leaves_the_scatter_of_the_contact_radius`).
 const DEGREE_IN_RATIO: usize = 6;
 const DEGREE_IN_MODULUS: usize = 5;
 
-/// One tabulated contact in the surface's variables.
+/// One tabulated contact in the variables of the surface.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
     /// a/R.
     ratio: f64,
     /// ln E.
     log_modulus: f64,
-    /// ln of the force over Hertz's of the same radius on a rigid flat.
+    /// ln of the force relative to Hertz's of the same radius on a rigid flat.
     value: f64,
 }
 
-/// The value and its slopes in ln a and ln E.
+/// The value with its slopes in ln a and ln E.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Value {
     value: f64,
@@ -418,8 +420,7 @@ struct Surface {
     log_modulus: Range,
     /// Rows by degree in a/R, columns by degree in ln E.
     coefficients: DMatrix<f64>,
-    /// Root mean square of what each sample that has others on both sides misses when it is left
-    /// out of the fit.
+    /// Root mean square leave-one-out error of the samples that have others on both sides.
     error: f64,
 }
 
@@ -456,7 +457,7 @@ impl Range {
     }
 }
 
-/// T₀ … T_n at t and their derivatives.
+/// Chebyshev polynomials T₀ … T_n at t and their derivatives.
 fn chebyshev(t: f64, polynomials: &mut [f64], derivatives: &mut [f64]) {
     for k in 0..polynomials.len() {
         (polynomials[k], derivatives[k]) = match k {
@@ -471,10 +472,10 @@ fn chebyshev(t: f64, polynomials: &mut [f64], derivatives: &mut [f64]) {
 }
 
 impl Surface {
-    /// Through samples of `moduli` different moduli. None where they do not determine it.
+    /// Fits samples of `moduli` different moduli. `None` if they do not determine the surface.
     fn fit(samples: &[Sample], moduli: usize) -> Option<Self> {
         let per_modulus = samples.len() / moduli.max(1);
-        // Two samples more than coefficients in each direction leave something to judge the fit by.
+        // Two samples more than coefficients in each direction allow an error of the fit.
         let rows = (DEGREE_IN_RATIO + 1).min(per_modulus.saturating_sub(2).max(1));
         let columns = (DEGREE_IN_MODULUS + 1).min(moduli);
         let mut surface = Self {
@@ -514,9 +515,9 @@ impl Surface {
         solution.iter().all(|c| c.is_finite()).then_some(surface)
     }
 
-    /// Whether there are contacts on both sides of one: at the ends of its curve and for the
-    /// smallest and the largest modulus leaving one out would show how well the fit extrapolates,
-    /// which it does nowhere.
+    /// Whether there are contacts on both sides of a sample. At the ends of its curve, and for the
+    /// smallest and the largest modulus, leaving one out would measure extrapolation, which is
+    /// never used.
     fn surrounds(&self, samples: &[Sample], i: usize) -> bool {
         let own = samples[i].log_modulus;
         let same = |k: usize| samples.get(k).is_some_and(|s| s.log_modulus == own);
@@ -525,7 +526,7 @@ impl Surface {
         inside && (of_one || (own > self.log_modulus.lower && own < self.log_modulus.upper))
     }
 
-    /// At a/R and ln E. The caller keeps to the range of the samples.
+    /// The value at a/R and ln E. The caller stays within the range of the samples.
     fn at(&self, ratio: f64, log_modulus: f64) -> Value {
         let basis = self.basis(ratio, log_modulus);
         let (mut value, mut ratio_slope, mut modulus_slope) = (0.0, 0.0, 0.0);

@@ -32,7 +32,7 @@ fn a_polynomial_is_found_again_with_its_slopes() {
 
 #[test]
 fn the_error_is_that_of_a_sample_left_out() {
-    // ±0.1 % of alternating scatter, which no polynomial of degree 6 follows.
+    // Alternating scatter of ±0.1 %, which no polynomial of degree 6 can follow.
     let scatter = |x: f64| 1e-3 * (-1f64).powf((x * 10.0).round());
     let surface = Surface::fit(&samples(|x, m| x * m + scatter(x)), 8).unwrap();
     let error = surface.error;
@@ -50,8 +50,7 @@ fn guide() -> Waveguide {
     Waveguide::new(vec![layer(2e-3, 136e3), layer(8e-3, 50e3)]).unwrap()
 }
 
-/// A law of the right kind with nothing but arithmetic in it: Hertz of two bodies, stiffened with
-/// a/R.
+/// A plausible law with plain arithmetic: Hertz's law of two bodies, stiffened with a/R.
 fn invented_force(a: f64, e: f64) -> f64 {
     let reduced = 1.0 / ((1.0 - 0.495 * 0.495) * (1.0 / e + 1.0 / 70e3));
     4.0 / 3.0 * reduced * a.powi(3) / RADIUS * (0.1 * (a / RADIUS).powi(2)).exp()
@@ -71,7 +70,7 @@ fn curve(youngs_modulus_pa: f64, largest_ratio: f64) -> ContactCurve {
 
 fn table() -> ContactTable {
     let moduli = (0..7).map(|k| 20e3 * 20f64.powf(f64::from(k) / 6.0));
-    // A stiff ball's contacts end earlier.
+    // The contacts of a stiff ball end earlier.
     let curves = moduli.map(|e| curve(e, 1.25 - 0.1 * (e / 20e3).log10()));
     ContactTable::new(RADIUS, 0.495, &guide(), curves.collect()).unwrap()
 }
@@ -89,7 +88,7 @@ fn forces_and_moduli_between_the_contacts() {
         for ratio in [0.13, 0.5, 0.97] {
             let a = ratio * RADIUS;
             let force = table.force_n(a, e).unwrap();
-            // The sixth power of ln E is left out: 5·10⁻⁵ of the force.
+            // The sixth power of ln E is neglected: 5·10⁻⁵ of the force.
             assert!(
                 (force / invented_force(a, e) - 1.0).abs() < 1e-4,
                 "{e} {ratio}"
@@ -97,7 +96,7 @@ fn forces_and_moduli_between_the_contacts() {
         }
         let loads = LoadSeries::new([load(0.6 * RADIUS, e), load(0.9 * RADIUS, e)]);
         let found = estimator.estimate(&loads).unwrap();
-        // The guide takes up to four fifths of the compliance: an error of the force counts five
+        // The guide has up to four fifths of the compliance, so an error of the force counts five
         // times.
         assert!((found.youngs_modulus_pa / e - 1.0).abs() < 5e-4);
         assert!(found.interval_95.contains(e) && found.fit.observations == 2);
@@ -105,13 +104,13 @@ fn forces_and_moduli_between_the_contacts() {
     assert!(table.interpolation_error() < 1e-4);
 }
 
-/// The table's own error does more to ln E where the force tells less of it. Taken as one error in
-/// proportion at all loads it would be inferred from the difference between two, and the answer
-/// carried far beyond both.
+/// The error of the table affects ln E more at loads that depend on it less. If it were treated as
+/// a common relative error at all loads, it would be inferred from the difference between two, and
+/// the result would be extrapolated far outside both.
 #[test]
 fn the_modulus_of_two_loads_lies_between_what_each_says() {
-    // On a guide that stiffens under a large contact the force of a stiff ball tells the more of E
-    // the larger the contact.
+    // On a guide that stiffens under a large contact, the force of a stiff ball depends on E the
+    // more, the larger the contact.
     let stiffening = |a: f64, e: f64| {
         let guide_pa = 70e3 * (1.0 + 2.0 * (a / RADIUS).powi(2));
         4.0 / 3.0 / (1.0 / e + 1.0 / guide_pa) * a.powi(3) / RADIUS
@@ -127,7 +126,7 @@ fn the_modulus_of_two_loads_lies_between_what_each_says() {
     let table = ContactTable::new(RADIUS, 0.495, &guide(), curves.collect()).unwrap();
     let estimator = TabulatedContact::new(table, RADIUS, 0.495, &guide()).unwrap();
     let e = 200e3;
-    // Half a per cent of the force, as meshes leave, at one of two loads.
+    // Half a per cent of the force, a typical mesh error, at one of two loads.
     let loads = [(0.6, 1.0), (0.9, 0.995)].map(|(ratio, off)| {
         let a = ratio * RADIUS;
         let force = off * stiffening(a, e);
@@ -158,7 +157,7 @@ fn what_the_table_does_not_hold_is_not_answered() {
     };
     let far = refused(1.4 * RADIUS, 60e3).to_string();
     assert!(far.starts_with("contact radius = "), "{far}");
-    // With a load inside, the one outside is left out and named.
+    // If one load is inside the range, the one outside is skipped and reported.
     let both = LoadSeries::new([load(0.8 * RADIUS, 60e3), load(1.4 * RADIUS, 60e3)]);
     let found = estimator.estimate(&both).unwrap();
     assert!(!found.loads[1].used && found.fit.observations == 1);
@@ -222,7 +221,7 @@ fn curves_without_meaning_are_refused() {
     });
     refuses("force: expected 16", |c| c[1].force_n.truncate(5));
     refuses("force = ", |c| c[1].force_n.swap(2, 3));
-    // The stiffer ball needs the smaller force.
+    // The stiffer ball has the smaller force.
     refuses("the table's force does not grow", |c| {
         c[1].force_n.iter_mut().for_each(|f| *f *= 0.3);
     });

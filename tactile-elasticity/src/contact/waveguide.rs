@@ -15,7 +15,7 @@ use crate::error::{ElasticityError, Quantity, poisson};
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Layer {
-    /// Thickness in m. Zero is allowed and counts for nothing.
+    /// Thickness in m. Zero is allowed and has no effect.
     pub thickness_m: f64,
     /// Young's modulus in Pa.
     pub youngs_modulus_pa: f64,
@@ -48,11 +48,11 @@ pub struct Waveguide {
 }
 
 impl Waveguide {
-    /// From the touched layer down.
+    /// Creates the waveguide from its layers, the touched one first.
     ///
     /// # Errors
-    /// No layers or no thickness at all, a negative thickness, a modulus that is not above zero, a
-    /// Poisson ratio out of range.
+    /// An error for no layers, a total thickness of zero, a negative thickness, a modulus that is
+    /// not positive, or a Poisson ratio out of range.
     pub fn new(layers: Vec<Layer>) -> Result<Self, ElasticityError> {
         for layer in &layers {
             Quantity::Thickness.not_negative(layer.thickness_m)?;
@@ -64,7 +64,7 @@ impl Waveguide {
         Ok(waveguide)
     }
 
-    /// A rigid flat: no layers.
+    /// A rigid flat, without layers.
     ///
     /// ```
     /// use tactile_elasticity::contact::Waveguide;
@@ -105,7 +105,8 @@ impl Waveguide {
     /// The waveguide as one deep body: (1 − ν²)/E of the layers in series, Σ(h(1 − ν²)/E)/Σh in
     /// 1/Pa.
     ///
-    /// True while the contact is small beside every layer's thickness and the layers are alike.
+    /// This is accurate if the contact is small compared with the thickness of each layer and the
+    /// layers are similar.
     pub fn as_body(&self) -> Body {
         if self.layers.is_empty() {
             return Body::rigid();
@@ -115,7 +116,7 @@ impl Waveguide {
         Body::from_compliance(compliance / self.thickness_m())
     }
 
-    /// The layer that is touched, as a half-space. Rigid where there is none.
+    /// The touched layer as a half-space. Rigid if there is none.
     ///
     /// ```
     /// use tactile_elasticity::contact::{Body, Layer, Waveguide};

@@ -6,15 +6,15 @@ use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
 /// A cone of half opening angle α: F = (2/π)E* tan α δ² = E* π a²/(2 tan α).
 ///
-/// Assumes linear elasticity, no friction, a rigid cone and a body deep beside the contact. Its
-/// size is tan α. I. N. Sneddon, Int. J. Eng. Sci. 3 (1965) 47.
+/// Assumes linear elasticity, no friction, a rigid cone, and a body that is deep compared with the
+/// contact. The size parameter is tan α. I. N. Sneddon, Int. J. Eng. Sci. 3 (1965) 47.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConeLaw {
     tangent: f64,
 }
 
 impl ConeLaw {
-    /// Of a cone with this tangent of its half opening angle from the axis.
+    /// Creates the law from the tangent of the half opening angle, measured from the axis.
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`].

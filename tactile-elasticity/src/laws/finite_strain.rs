@@ -1,24 +1,24 @@
-//! What finite strain adds to the linear contact of a ball with a flat or with layers.
+//! Finite-strain correction of the linear contact of a ball with a flat or with layers.
 //!
-//! At the same contact radius a ball on a rigid flat carries less than linear theory says, at first
-//! by a tenth of a/R, and more beyond a/R = 1. A guide that yields wraps round the ball. With x =
-//! a/R, β the ball's part of the compliance, γ = 1 − β the guide's, y = a/h, and f = ln(F/F_Hertz)
-//! and d = ln(δ/δ_Hertz) of the linear contact with the layers,
+//! At the same contact radius, a ball on a rigid flat carries less than linear theory predicts, at
+//! first by a tenth of a/R, and more above a/R = 1. A compliant guide wraps around the ball. Let x
+//! = a/R, β the ball's part of the compliance, γ = 1 − β that of the guide, y = a/h, and f =
+//! ln(F/F_Hertz) and d = ln(δ/δ_Hertz) of the linear contact with the layers. Then
 //!
 //! ln(F/F_linear) = β P₁(x) + γ [P₂(x) + β P₃(x) + d P₄(x) + f P₅(x) + y P₆(x)],
 //!
-//! and the same form for ln(δ/δ_linear). The polynomials are fitted to axisymmetric finite elements
-//! without friction, neo-Hookean with ν = 0.495: a rigid flat, the paper's three layers under balls
-//! of 3 to 20 mm and 30 to 250 kPa, single layers of 0.8 to 4 ball radii, 0.5 to 4 times as stiff as
-//! the ball. A/R 0.2 to 1.15, a/h up to 1.6. Small contacts and deep layers need no correction:
-//! every power of x is at least one.
+//! and ln(δ/δ_linear) has the same form. The polynomials are fitted to axisymmetric finite elements
+//! without friction, neo-Hookean with ν = 0.495: on a rigid flat, on the paper's three layers under
+//! balls of 3 to 20 mm and 30 to 250 kPa, and on single layers of 0.8 to 4 ball radii that are 0.5
+//! to 4 times as stiff as the ball, with a/R from 0.2 to 1.15 and a/h up to 1.6. Small contacts and
+//! deep layers need no correction: every power of x is at least one.
 
-/// What the linear contact says, at one contact radius.
+/// Results of the linear contact at one contact radius.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LinearContact {
     /// a/R.
     pub(super) ratio: f64,
-    /// The ball's part of the compliance, layers and their depth counted.
+    /// The ball's part of the compliance, with the layers and their depth taken into account.
     pub(super) ball: f64,
     /// a/h. Zero on a rigid flat.
     pub(super) layer_ratio: f64,
@@ -29,7 +29,7 @@ pub(super) struct LinearContact {
 }
 
 impl LinearContact {
-    /// dβ/d ln a. Where one body takes all of the compliance, β no longer follows a.
+    /// dβ/d ln a. If one body has all of the compliance, β does not depend on a.
     fn ball_slope(&self) -> f64 {
         if self.ball > 0.0 && self.ball < 1.0 {
             self.ball * self.log_force[1]
@@ -39,13 +39,13 @@ impl LinearContact {
     }
 }
 
-/// A correction and its slopes.
+/// A correction with its slopes.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Correction {
     pub(super) value: f64,
-    /// In ln a.
+    /// Slope in ln a.
     pub(super) slope: f64,
-    /// In ln x alone: minus the slope in ln R.
+    /// Slope in ln x alone: the negative slope in ln R.
     pub(super) ratio_slope: f64,
 }
 
@@ -56,9 +56,9 @@ pub(super) struct FiniteStrain {
 }
 
 impl FiniteStrain {
-    /// Largest a/R of the contacts that the correction was fitted to.
+    /// Largest a/R of the contacts used for the fit.
     pub(super) const LARGEST_CONTACT_RATIO: f64 = 1.2;
-    /// Largest a/h of these.
+    /// Largest a/h of the contacts used for the fit.
     pub(super) const LARGEST_LAYER_RATIO: f64 = 1.6;
 
     pub(super) fn new(poisson_ratio: f64) -> Self {
@@ -68,8 +68,9 @@ impl FiniteStrain {
     /// ln(F/F_linear).
     pub(super) fn force(&self, contact: &LinearContact) -> Correction {
         let mut correction = FORCE.at(contact);
-        // A confined body's bulk yields to the mean pressure, which a half-space's does not: x (½ −
-        // ν)(γ + 2.3 β) leaves 0.3 % on a flat for ν from 0.45 to ½, 1 % on layers from 0.47.
+        // The bulk of a confined body is compressed by the mean pressure, unlike that of a
+        // half-space: the term x (½ − ν)(γ + 2.3 β) leaves an error of 0.3 % on a flat for ν from
+        // 0.45 to ½, and of 1 % on layers from 0.47.
         let per_ball = (FITTED_POISSON_RATIO - self.poisson_ratio) * contact.ratio;
         let bulk = per_ball * (1.0 + 1.3 * contact.ball);
         correction.value += bulk;
@@ -78,20 +79,20 @@ impl FiniteStrain {
         correction
     }
 
-    /// ln(δ/δ_linear). δ is the approach of the ball's centre, which the ball's own bulk lets lag
-    /// behind.
+    /// ln(δ/δ_linear). δ is the approach of the ball's centre, reduced by the compression of the
+    /// ball's own bulk.
     pub(super) fn indentation(&self, contact: &LinearContact) -> Correction {
         INDENTATION.at(contact)
     }
 
-    /// Standard error of ln F from the model: what the fit leaves of contacts that it was not
-    /// fitted to.
+    /// Standard error of ln F of the model: the residuals of contacts that were not used for the
+    /// fit.
     pub(super) fn error(&self, x: f64, layer_ratio: Option<f64>, by_indentation: bool) -> f64 {
         let fit = match layer_ratio {
             None => 0.004,
             Some(_) => 0.002 + 0.01 * x * x,
         };
-        // Beyond the contacts that it was fitted to, the correction is as likely wrong as right.
+        // Outside the fitted contacts, the correction is as likely to be wrong as right.
         let beyond_ratio = (x - Self::LARGEST_CONTACT_RATIO).max(0.0);
         let beyond_layer = layer_ratio.map_or(0.0, |y| (y - Self::LARGEST_LAYER_RATIO).max(0.0));
         let beyond = 0.5 * beyond_ratio + 0.1 * beyond_layer;
@@ -109,10 +110,10 @@ impl FiniteStrain {
     }
 }
 
-// ν of the contacts that the correction was fitted to.
+// ν of the contacts used for the fit.
 const FITTED_POISSON_RATIO: f64 = 0.495;
 
-/// Coefficients of x, x², … as their powers say.
+/// Coefficients of the stated powers of x.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Polynomials {
     /// x, x², x⁴, x⁶.
@@ -131,8 +132,8 @@ struct Polynomials {
 
 impl Polynomials {
     fn at(&self, contact: &LinearContact) -> Correction {
-        // Beyond the fitted contacts the polynomials would run away: they go on along the tangent
-        // in ln x.
+        // Outside the fitted contacts the polynomials would diverge, so they are extrapolated along
+        // the tangent in ln x.
         let inside = contact.ratio.min(FiniteStrain::LARGEST_CONTACT_RATIO);
         let x = |coefficients: &[f64], powers: &[i32]| {
             let terms = coefficients.iter().zip(powers);
@@ -174,8 +175,8 @@ impl Polynomials {
     }
 }
 
-// Leaves 0.3 % of the force on a flat, where the elements scatter by as much, and 0.6 % on guides
-// (root mean square). Of 13 scenes that it was not fitted to, 0.6 %.
+// Residuals (root mean square): 0.3 % of the force on a flat, which equals the scatter of the
+// elements, and 0.6 % on guides. For 13 scenes not used for the fit: 0.6 %.
 const FORCE: Polynomials = Polynomials {
     ball: [-0.0802, -0.0489, 0.1702, -0.0379],
     guide: [-0.1409, 0.4893, -0.4257, 0.3998],
@@ -185,8 +186,8 @@ const FORCE: Polynomials = Polynomials {
     depth: [-0.2104, 0.1450],
 };
 
-// Leaves 0.3 % of the approach on a flat, 0.8 % on guides. Of 13 scenes that it was not fitted to,
-// 0.6 %.
+// Residuals: 0.3 % of the approach on a flat and 0.8 % on guides. For 13 scenes not used for the
+// fit: 0.6 %.
 const INDENTATION: Polynomials = Polynomials {
     ball: [-0.2297, -0.2563, -0.2349, 0.1099],
     guide: [-0.0271, 0.4013, -0.2207, 0.3105],

@@ -2,7 +2,7 @@ use super::*;
 
 #[test]
 fn slopes_are_derivatives() {
-    // A contact whose layers are felt as powers of a.
+    // A contact in which the effect of the layers is a power of a.
     let contact = |a: f64| LinearContact {
         ratio: a,
         ball: 0.6 * a.powf(-0.3),

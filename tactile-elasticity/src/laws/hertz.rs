@@ -5,18 +5,19 @@ use crate::error::{ElasticityError, Quantity};
 
 /// Hertz's ball of (relative) radius R: F = 4E*a³/(3R) = 4⁄3 E*√R δ^{3⁄2}.
 ///
-/// Assumes linear elasticity, no friction, no adhesion, bodies deep beside the contact, and a
-/// contact small beside the ball: a/R up to 0.3. K. L. Johnson, *Contact Mechanics* (1985), §4.2.
+/// Assumes linear elasticity, no friction, no adhesion, bodies that are deep compared with the
+/// contact, and a contact that is small compared with the ball: a/R up to 0.3. K. L. Johnson,
+/// *Contact Mechanics* (1985), §4.2.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HertzLaw {
     radius_m: f64,
 }
 
-/// a/R up to which a ball's pressure is Hertz's.
+/// a/R up to which the pressure of a ball is Hertzian.
 pub(super) const SMALL_CONTACT: f64 = 0.3;
 
 impl HertzLaw {
-    /// Of a ball of relative radius R (m).
+    /// Creates the law of a ball with relative radius R (m).
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`].

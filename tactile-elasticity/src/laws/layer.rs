@@ -18,17 +18,19 @@ pub struct LayerLaw {
     kernel: LayerKernel,
 }
 
-// Half the step in ln a of the slopes.
+// Half the step in ln a for the slopes.
 const HALF_STEP: f64 = 1e-4;
-// ln(a/h) at which the search for an indentation may begin: below the largest a/h that is solved.
+// Largest ln(a/h) at the start of the search for an indentation: below the largest a/h that is
+// solved.
 const LARGEST_START: f64 = 2.9;
-// Steps of the secant method, which takes some five.
+// Maximum number of secant steps. About five are typical.
 const STEPS: usize = 40;
-// Gap in ln χ that ends it.
+// Gap in ln χ at which the secant method stops.
 const SETTLED: f64 = 1e-13;
 
 impl LayerLaw {
-    /// Of a ball of radius R (m) on a layer of thickness h (m) and Poisson ratio ν.
+    /// Creates the law of a ball with radius R (m) on a layer of thickness h (m) and Poisson ratio
+    /// ν.
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].

@@ -1,4 +1,5 @@
-//! Contact laws F = E* f(x), x the contact radius or the indentation: one file a law.
+//! Contact laws F = E* f(x), with x the contact radius or the indentation. There is one file per
+//! law.
 //!
 //! | law | contact |
 //! |---|---|
@@ -25,7 +26,7 @@ pub use waveguide::WaveguideLaw;
 
 use std::ops::Deref;
 
-/// What was measured of a contact, in metres.
+/// The measured length of a contact, in metres.
 ///
 /// ```
 /// use tactile_elasticity::laws::ContactLength;
@@ -41,14 +42,14 @@ pub enum ContactLength {
 }
 
 impl ContactLength {
-    /// The length, whichever it is.
+    /// The length in metres, of either kind.
     pub const fn metres(self) -> f64 {
         match self {
             Self::Radius(x) | Self::Indentation(x) => x,
         }
     }
 
-    /// The same length times a factor.
+    /// Multiplies the length by a factor.
     fn times(self, factor: f64) -> Self {
         match self {
             Self::Radius(x) => Self::Radius(x * factor),
@@ -57,30 +58,30 @@ impl ContactLength {
     }
 }
 
-/// ln f = ln(F/E*) of a contact, with what the law adds to it.
+/// ln f = ln(F/E*) of a contact, with further properties that a law may state.
 ///
 /// ```
 /// use tactile_elasticity::laws::LogForce;
 ///
-/// // ln f alone: slopes are found by differences.
+/// // ln f alone: slopes are computed by differences.
 /// let hertz = |a: f64| LogForce::new((4.0 / 3.0 * a.powi(3) / 5e-3).ln());
-/// // With its slopes in ln a and in ln R, and good to 1 %.
+/// // With its slopes in ln a and in ln R, and an accuracy of 1 %.
 /// let stated = hertz(1e-3).with_slopes(3.0, -1.0).with_error(0.01);
 /// assert_ne!(hertz(1e-3), stated);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LogForce {
     value: f64,
-    /// In ln x and in ln R.
+    /// Slopes in ln x and in ln R.
     slopes: Option<[f64; 2]>,
     sample_part: Option<f64>,
     error: f64,
 }
 
 impl LogForce {
-    /// ln f. Its slopes are found by differences: in ln x by evaluating the law beside the length,
-    /// in the logarithm of the indenter's size R as 2 less that, for f has the dimension of an
-    /// area. A law with more lengths than x and R states them.
+    /// Creates the value from ln f. Its slope in ln x is computed by evaluating the law next to the
+    /// length. Its slope in ln R, with R the size of the indenter, is 2 minus that slope, because f
+    /// has the dimension of an area. A law with more lengths than x and R must state its slopes.
     pub const fn new(value: f64) -> Self {
         Self {
             value,
@@ -90,14 +91,14 @@ impl LogForce {
         }
     }
 
-    /// With d ln f/d ln x and d ln f/d ln R, R the size of the indenter.
+    /// States d ln f/d ln x and d ln f/d ln R, with R the size of the indenter.
     #[must_use]
     pub const fn with_slopes(mut self, slope: f64, size_slope: f64) -> Self {
         self.slopes = Some([slope, size_slope]);
         self
     }
 
-    /// With the sample's part of the contact's compliance, where it is not 1 − share: on a layer
+    /// States the sample's part of the contact's compliance, if it is not 1 − share: on a layer
     /// that is not deep.
     #[must_use]
     pub const fn with_sample_part(mut self, sample_part: f64) -> Self {
@@ -105,7 +106,7 @@ impl LogForce {
         self
     }
 
-    /// With the standard error of ln F that is the law's own, the same at every load of one size.
+    /// States the standard error of ln F due to the law itself, common to all loads of one size.
     #[must_use]
     pub const fn with_error(mut self, error: f64) -> Self {
         self.error = error;
@@ -117,22 +118,22 @@ impl LogForce {
         self.value
     }
 
-    /// Slopes in ln x and ln R, where they are stated.
+    /// Slopes in ln x and ln R. `None` if the law does not state them.
     pub const fn slopes(&self) -> Option<[f64; 2]> {
         self.slopes
     }
 
-    /// The sample's part of the compliance, where it is stated.
+    /// The sample's part of the compliance. `None` if the law does not state it.
     pub const fn sample_part(&self) -> Option<f64> {
         self.sample_part
     }
 
-    /// Standard error of ln F that is the law's own.
+    /// Standard error of ln F due to the law itself.
     pub const fn error(&self) -> f64 {
         self.error
     }
 
-    /// With a correction, and what it adds to the slopes.
+    /// Adds a correction to the value and the slopes.
     fn corrected(self, value: f64, slope: f64, size_slope: f64) -> Self {
         Self {
             value: self.value + value,
@@ -142,7 +143,7 @@ impl LogForce {
     }
 }
 
-/// What a law has to say of a length.
+/// Result of a law for a length.
 ///
 /// ```
 /// use tactile_elasticity::laws::{ContactLaw, ContactLength, HertzLaw, PunchLaw, Reach};
@@ -155,16 +156,16 @@ impl LogForce {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reach {
-    /// ln f there.
+    /// ln f at this length.
     At(LogForce),
-    /// The law does not reach so far.
+    /// The length is outside the range of the law.
     Beyond,
-    /// The force does not depend on this length, or the law has no formula for it.
+    /// The force does not depend on this kind of length, or the law has no formula for it.
     NotMine,
 }
 
 impl Reach {
-    /// ln f there.
+    /// ln f at this length. `None` if the law gives none.
     pub fn at(self) -> Option<LogForce> {
         match self {
             Self::At(log_force) => Some(log_force),
@@ -174,13 +175,13 @@ impl Reach {
 }
 
 impl From<Option<LogForce>> for Reach {
-    /// `None` is beyond the law.
+    /// Treats `None` as outside the range of the law.
     fn from(found: Option<LogForce>) -> Self {
         found.map_or(Self::Beyond, Self::At)
     }
 }
 
-/// For which contacts a law is meant: beyond, an estimate carries a warning.
+/// Range of contacts for which a law is valid. Outside it, an estimate carries a warning.
 ///
 /// ```
 /// use tactile_elasticity::laws::Limits;
@@ -190,17 +191,17 @@ impl From<Option<LogForce>> for Reach {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
-    /// R, of a law with a radius: a/R stands in the diagnostics of every load.
+    /// R for laws with a radius. The diagnostics of every load then contain a/R.
     pub radius_m: Option<f64>,
-    /// The largest a/R.
+    /// The largest valid a/R.
     pub contact_ratio: f64,
-    /// Of a law of the guide's layers, whose E* is that of the sample and of the touched layer:
-    /// their thickness h (m) and the largest a/h.
+    /// For laws of the guide's layers, whose E* is that of the sample and the touched layer: their
+    /// thickness h (m) and the largest valid a/h.
     pub layers: Option<[f64; 2]>,
 }
 
 impl Default for Limits {
-    /// No radius, no limit.
+    /// No radius and no limit.
     fn default() -> Self {
         Self {
             radius_m: None,
@@ -211,7 +212,7 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// Of a ball of radius R (m), up to this a/R.
+    /// Limits of a ball with radius R (m), up to this a/R.
     pub fn of_ball(radius_m: f64, contact_ratio: f64) -> Self {
         Self {
             radius_m: Some(radius_m),
@@ -220,7 +221,7 @@ impl Limits {
         }
     }
 
-    /// a/R. By Hertz's a² = Rδ where the indentation alone is known.
+    /// a/R. If only the indentation is known, it follows from Hertz's a² = Rδ.
     pub(crate) fn ratio(
         &self,
         contact_radius_m: Option<f64>,
@@ -233,23 +234,23 @@ impl Limits {
     }
 }
 
-/// A law F = E* f(x) of a contact, x the contact radius or the indentation. A law of one's own
-/// implements [`log_force`](Self::log_force) and goes into
+/// A law F = E* f(x) of a contact, with x the contact radius or the indentation. A user-defined law
+/// implements [`log_force`](Self::log_force) and is passed to
 /// [`ContactEstimator::from_law`](crate::modulus::ContactEstimator::from_law).
 ///
-/// `share` is the other body's part of 1/E*, in [0, 1]: 0 where it is rigid. Most laws do not
-/// depend on it. A boxed or shared law is a law as well.
+/// `share` is the other body's part of 1/E*, in [0, 1], and 0 if it is rigid. Most laws do not
+/// depend on it. A boxed or shared law also implements the trait.
 pub trait ContactLaw: Send + Sync {
-    /// ln f of a length that is above zero.
+    /// ln f for a positive length.
     fn log_force(&self, length: ContactLength, share: f64) -> Reach;
 
-    /// For which contacts the law is meant. By default all, without a radius.
+    /// The range of valid contacts. By default there is no limit and no radius.
     fn limits(&self) -> Limits {
         Limits::default()
     }
 }
 
-/// Boxed, shared and borrowed laws.
+/// Implements the trait for boxed, shared and borrowed laws.
 impl<P: Deref<Target: ContactLaw> + Send + Sync> ContactLaw for P {
     fn log_force(&self, length: ContactLength, share: f64) -> Reach {
         (**self).log_force(length, share)
@@ -260,12 +261,12 @@ impl<P: Deref<Target: ContactLaw> + Send + Sync> ContactLaw for P {
     }
 }
 
-// Half the step in ln x of the numerical slope: the third derivative leaves 10⁻⁸ of it, rounding
-// 10⁻¹¹.
+// Half the step in ln x of the numerical slope. The third derivative leaves a relative error of
+// 10⁻⁸, rounding one of 10⁻¹¹.
 const HALF_STEP: f64 = 1e-4;
 
-/// Slopes of ln f in ln x and ln R: those stated, or by differences. `None` where the law does not
-/// reach on either side.
+/// Slopes of ln f in ln x and ln R: the stated ones, or differences. `None` if the law is not
+/// defined on both sides.
 pub(crate) fn slopes<L: ContactLaw + ?Sized>(
     law: &L,
     length: ContactLength,

@@ -5,15 +5,15 @@ use crate::error::{ElasticityError, Quantity};
 
 /// A flat circular punch of radius a: F = 2E*aδ.
 ///
-/// Assumes linear elasticity, no friction, a rigid end and a body deep beside it. Its contact has
-/// one radius under every force. I. N. Sneddon, Int. J. Eng. Sci. 3 (1965) 47.
+/// Assumes linear elasticity, no friction, a rigid end, and a body that is deep compared with it.
+/// The contact has the same radius for every force. I. N. Sneddon, Int. J. Eng. Sci. 3 (1965) 47.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PunchLaw {
     radius_m: f64,
 }
 
 impl PunchLaw {
-    /// Of a punch of radius a (m).
+    /// Creates the law of a punch with radius a (m).
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`].

@@ -7,34 +7,36 @@ use crate::contact::{Bond, LayerKernel, SharedLayerTable, Waveguide};
 use crate::error::{ElasticityError, Quantity, poisson};
 
 /// F = E* f(a): the linear contact of a ball with bonded layers on a rigid base
-/// ([`LayerEquation`](crate::contact::LayerEquation)), tabulated, times what finite strain adds. E*
-/// is that of the ball and the touched layer.
+/// ([`LayerEquation`](crate::contact::LayerEquation)), tabulated, times a finite-strain correction.
+/// E* is that of the ball and the touched layer.
 ///
 /// Assumes no friction, no adhesion, neo-Hookean bodies with ν near 0.495, a/R up to 1.2 and a/h up
-/// to 1.6. Fitted to the finite elements of `tactile-fem`, whose scatter is its own error.
+/// to 1.6. It is fitted to the finite elements of `tactile-fem`, whose scatter is the error of the
+/// law.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WaveguideLaw {
     ball: HertzLaw,
     thickness_m: f64,
-    /// None on a rigid flat.
+    /// `None` on a rigid flat.
     layers: Option<SharedLayerTable>,
     finite_strain: Option<FiniteStrain>,
 }
 
-// Contact radii tabulated, over the ball's radius. Above the second no contact of a ball is meant.
+// Tabulated contact radii, relative to the ball's radius. Above the second value no contact of a
+// ball is valid.
 const TABULATED: (f64, f64) = (0.02, 1.6);
 
-// Indentation over the ball's radius beyond which finite elements and this law part.
+// Indentation relative to the ball's radius above which finite elements and this law differ.
 const LARGEST_INDENTATION: f64 = 0.8;
 
-// Newton's method for the contact of an indentation takes some five steps in ln a, none longer than
-// what the table covers around the first guess, and ends at rounding.
+// Newton's method for the contact of an indentation takes about five steps in ln a, each limited to
+// the range of the table around the first guess, and stops at rounding.
 const STEPS: usize = 40;
 const LARGEST_STEP: f64 = 0.5;
 const SETTLED: f64 = 1e-12;
 
 impl WaveguideLaw {
-    /// Of a ball of radius R (m) and Poisson ratio ν on the layers of a guide.
+    /// Creates the law of a ball with radius R (m) and Poisson ratio ν on the layers of a guide.
     ///
     /// # Errors
     /// Those of the layers' contact: [`ElasticityError`].
@@ -70,7 +72,7 @@ impl WaveguideLaw {
         self
     }
 
-    /// The contact of radius a. None beyond the table.
+    /// The contact of radius a. `None` outside the table.
     fn contact(&self, a: f64, share: f64) -> Option<Contact> {
         let x = a / self.ball.radius_m();
         if x > TABULATED.1 {
@@ -87,8 +89,8 @@ impl WaveguideLaw {
             None => rigid,
             Some(table) => {
                 let layers = table.at(a / self.thickness_m, share)?;
-                // The ball's compliance (1 − s)/E* times the stiffness that the contact has,
-                // F/F_Hertz times E*.
+                // The ball's compliance (1 − s)/E* times the stiffness of the contact, F/F_Hertz
+                // times E*.
                 let ball = ((1.0 - share) * layers.force[0].exp()).clamp(0.0, 1.0);
                 LinearContact {
                     ball,
@@ -120,11 +122,11 @@ impl WaveguideLaw {
         let contact = self.of_indentation(d, share)?;
         let [by_radius, by_size] = contact.log_force.slopes()?;
         let slope = by_radius / contact.indentation_slope;
-        // f has the dimension of an area. Layers apart, its slopes in δ and R add up to 2.
+        // f has the dimension of an area. Apart from the layers, its slopes in δ and R add up to 2.
         Some(contact.log_force.with_slopes(slope, by_size + slope))
     }
 
-    /// Standard error of ln F that the law leaves.
+    /// Standard error of ln F due to the law.
     fn error(&self, length: ContactLength) -> f64 {
         let Some(strain) = &self.finite_strain else {
             return 0.0;
@@ -150,20 +152,20 @@ impl WaveguideLaw {
             if step.abs() < SETTLED {
                 return Some(contact);
             }
-            // A step into what is not tabulated is halved by the limit.
+            // A step outside the table is shortened to the limit.
             log_a = (log_a - step.clamp(-LARGEST_STEP, LARGEST_STEP)).min(largest);
         }
         None
     }
 }
 
-/// A contact of one radius, as the linear law and finite strain give it.
+/// A contact of one radius, by the linear law with the finite-strain correction.
 struct Contact {
     log_force: LogForce,
     log_indentation: f64,
     /// d ln δ/d ln a.
     indentation_slope: f64,
-    /// The ball's part of the compliance, layers and their depth counted.
+    /// The ball's part of the compliance, with the layers and their depth taken into account.
     ball_part: f64,
 }
 
@@ -171,7 +173,8 @@ impl ContactLaw for WaveguideLaw {
     fn log_force(&self, length: ContactLength, share: f64) -> Reach {
         let found = match length {
             ContactLength::Radius(a) => self.contact(a, share).map(|contact| {
-                // On a rigid flat the ball's part is all that the other body leaves.
+                // On a rigid flat the ball has all of the compliance that the other body does not
+                // have.
                 match self.layers {
                     Some(_) => contact.log_force.with_sample_part(contact.ball_part),
                     None => contact.log_force,

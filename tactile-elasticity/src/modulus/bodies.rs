@@ -1,4 +1,4 @@
-//! The sample, and what it is pressed on.
+//! The sample, and the guide that it is pressed against.
 
 use crate::contact::{Body, GuideErrors, PARAMETERS_PER_LAYER, Waveguide};
 use crate::error::{ElasticityError, Quantity, poisson};
@@ -27,57 +27,57 @@ use tactile_core::{Source, Uncertain};
 pub enum Object {
     /// A ball.
     Sphere {
-        /// Its radius in metres.
+        /// Radius in metres.
         radius_m: f64,
-        /// Its Poisson ratio.
+        /// Poisson ratio.
         poisson_ratio: f64,
     },
-    /// A flat-ended cylinder: loaded uniaxially.
+    /// A flat-ended cylinder under uniaxial load.
     FlatPunch {
-        /// Its radius in metres.
+        /// Radius in metres.
         radius_m: f64,
-        /// Its Poisson ratio.
+        /// Poisson ratio.
         poisson_ratio: f64,
     },
-    /// A block with a flat face of any outline, squeezed between the sensor and a plate: loaded
-    /// uniaxially.
+    /// A block with a flat face of any outline, compressed between the sensor and a plate under
+    /// uniaxial load.
     Block {
-        /// Its Poisson ratio.
+        /// Poisson ratio.
         poisson_ratio: f64,
     },
-    /// A cylinder standing on its flat face, squeezed between the sensor and a plate: loaded
-    /// uniaxially.
+    /// A cylinder standing on its flat face, compressed between the sensor and a plate under
+    /// uniaxial load.
     Cylinder {
-        /// Its Poisson ratio.
+        /// Poisson ratio.
         poisson_ratio: f64,
     },
-    /// A thin flat sample, bonded to a rigid base and pressed by a rigid ball: the sensor's own
-    /// gel, for instance.
+    /// A thin flat sample, bonded to a rigid base and pressed by a rigid ball, for example the
+    /// sensor's own gel.
     Layer {
-        /// The ball's radius in metres.
+        /// Radius of the ball in metres.
         indenter_radius_m: f64,
-        /// The sample's thickness in metres.
+        /// Thickness of the sample in metres.
         thickness_m: f64,
-        /// The sample's Poisson ratio.
+        /// Poisson ratio of the sample.
         poisson_ratio: f64,
     },
     /// A deep sample, pressed by a rigid cone.
     Cone {
         /// Half of the cone's opening angle, from its axis, in radians.
         half_angle_rad: f64,
-        /// The sample's Poisson ratio.
+        /// Poisson ratio of the sample.
         poisson_ratio: f64,
     },
-    /// Nothing is known of its shape: it is read as a block where its contacts are those of a flat
-    /// face, and refused where not.
+    /// An object of unknown shape. It is treated as a block if its contacts are those of a flat
+    /// face, and rejected otherwise.
     Unknown {
-        /// Its Poisson ratio.
+        /// Poisson ratio.
         poisson_ratio: f64,
     },
 }
 
 impl Object {
-    /// Poisson's ratio where none is given: rubber, incompressible.
+    /// Default Poisson ratio, that of incompressible rubber.
     pub const DEFAULT_POISSON_RATIO: f64 = 0.5;
 
     /// A rubber ball of this radius in metres.
@@ -88,7 +88,7 @@ impl Object {
         }
     }
 
-    /// The radius of a ball in metres. `None` of every other object.
+    /// The radius of a ball in metres. `None` for any other object.
     pub fn sphere_radius_m(&self) -> Option<f64> {
         match self {
             Self::Sphere { radius_m, .. } => Some(*radius_m),
@@ -96,7 +96,7 @@ impl Object {
         }
     }
 
-    /// The radius in metres of a ball, a punch or the ball that indents a layer. `None` of every
+    /// The radius in metres of a ball, a punch, or the ball that indents a layer. `None` for any
     /// other object.
     pub fn radius_m(&self) -> Option<f64> {
         match *self {
@@ -108,7 +108,7 @@ impl Object {
         }
     }
 
-    /// Its Poisson ratio.
+    /// Poisson ratio of the object.
     pub fn poisson_ratio(&self) -> f64 {
         match self {
             Self::Sphere { poisson_ratio, .. }
@@ -121,13 +121,13 @@ impl Object {
         }
     }
 
-    /// Whether it is the object that touches the sensor. A layer and a deep sample are pressed by a
+    /// Whether the object itself touches the sensor. A layer and a deep sample are pressed by a
     /// rigid indenter instead.
     fn touches_guide(&self) -> bool {
         !matches!(self, Self::Layer { .. } | Self::Cone { .. })
     }
 
-    /// Itself, if it is physical.
+    /// Returns the object if it is physical.
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::OutOfRange`] for an angle outside (0,
@@ -165,8 +165,8 @@ pub(super) fn half_angle(angle_rad: f64) -> Result<f64, ElasticityError> {
     Ok(angle_rad)
 }
 
-/// The bodies of a press: the sample, and the guide it is pressed on, with the errors of what is
-/// known of them. They stand beside the loads in the input of an estimator.
+/// The bodies of a press: the sample and the guide that it is pressed against, with the errors of
+/// their parameters. Together with the loads they are the input of an estimator.
 ///
 /// ```
 /// use tactile_elasticity::contact::{Layer, Waveguide};
@@ -176,7 +176,7 @@ pub(super) fn half_angle(angle_rad: f64) -> Result<f64, ElasticityError> {
 /// let gel = Waveguide::new(vec![gel])?;
 /// let bodies = Bodies::new(Object::sphere(3e-3), Some(gel.clone()));
 /// assert_eq!(bodies.in_series(), gel.as_body());
-/// // A rigid cone presses a deep sample: the guide has no part in it.
+/// // A rigid cone presses a deep sample, without the guide.
 /// let sample = Object::Cone { half_angle_rad: 1.0, poisson_ratio: 0.5 };
 /// assert!(Bodies::new(sample, Some(gel)).guide().is_none());
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -193,13 +193,14 @@ pub struct Bodies {
 
 #[derive(Clone, Debug, PartialEq)]
 enum GuideError {
-    /// Of the compliance, under every contact.
+    /// Error of the compliance, common to all contacts.
     Common(Uncertain),
     OfLayers(GuideErrors),
 }
 
 impl Bodies {
-    /// Of the sample, and the layers of the guide where they are known. Both are exact.
+    /// Creates the bodies from the sample and, if they are known, the layers of the guide. Both are
+    /// exact.
     pub fn new(object: Object, guide: Option<Waveguide>) -> Self {
         Self {
             object,
@@ -211,8 +212,8 @@ impl Bodies {
         }
     }
 
-    /// With a relative standard error of the object's size, [`Source::ObjectSize`]: of its radius,
-    /// or of the tangent of its half angle.
+    /// States the relative standard error of the object's size, [`Source::ObjectSize`]: that of its
+    /// radius, or of the tangent of its half angle.
     ///
     /// # Errors
     /// [`ElasticityError::Negative`].
@@ -221,7 +222,7 @@ impl Bodies {
         Ok(self)
     }
 
-    /// With a standard error of the sample's Poisson ratio, [`Source::PoissonRatio`].
+    /// States the standard error of the sample's Poisson ratio, [`Source::PoissonRatio`].
     ///
     /// # Errors
     /// [`ElasticityError::Negative`].
@@ -230,10 +231,10 @@ impl Bodies {
         Ok(self)
     }
 
-    /// With a work of adhesion w (J/m²) that a ball may have, [`Source::Adhesion`]. The contact of
-    /// a ball of radius R under a force F looks softer by ½ √(6πwR/F), to first order in √w
-    /// (Johnson, Kendall and Roberts 1971): the radius is that of F + √(6πwR F), and of the
-    /// pressure the rim is missing. Other objects have none.
+    /// States the possible work of adhesion w (J/m²) of a ball, [`Source::Adhesion`]. The contact
+    /// of a ball of radius R under a force F appears softer by ½ √(6πwR/F), to first order in √w
+    /// (Johnson, Kendall and Roberts 1971): the radius corresponds to the force F + √(6πwR F), and
+    /// the pressure lacks its rim. For other objects it has no effect.
     ///
     /// # Errors
     /// [`ElasticityError::Negative`].
@@ -244,9 +245,9 @@ impl Bodies {
         Ok(self)
     }
 
-    /// With the factor by which the guide's compliance may be another than stated, under every
-    /// contact: one with parts of [`Source::Guide`], and of [`Source::PixelSize`] where the guide
-    /// was checked by contact radii that the same pixels measured.
+    /// States the ratio of the guide's true compliance to the stated one, for every contact: one,
+    /// with errors of [`Source::Guide`], and of [`Source::PixelSize`] if the guide was checked with
+    /// contact radii measured by the same pixels.
     ///
     /// # Errors
     /// [`ElasticityError::Negative`].
@@ -264,9 +265,9 @@ impl Bodies {
         Ok(self)
     }
 
-    /// With the covariance of ln E of all layers, then of ln h, then of ν
-    /// ([`PARAMETERS_PER_LAYER`]), and what a standard deviation of the size of a pixel does to
-    /// each, where they are correlated.
+    /// States the covariance of ln E of all layers, then of ln h, then of ν
+    /// ([`PARAMETERS_PER_LAYER`]), and the change of each per standard deviation of the pixel size,
+    /// if they are correlated.
     ///
     /// # Errors
     /// [`ElasticityError::LengthMismatch`], [`ElasticityError::NotFinite`].
@@ -314,24 +315,24 @@ impl Bodies {
         self.object
     }
 
-    /// The guide that the sample is pressed on. `None` if its layers are not known or a rigid
-    /// indenter presses the sample instead.
+    /// The guide that the sample is pressed against. `None` if its layers are unknown, or if a
+    /// rigid indenter presses the sample instead.
     pub fn guide(&self) -> Option<&Waveguide> {
         let guide = self.guide.as_ref()?;
         self.object.touches_guide().then_some(guide)
     }
 
-    /// The guide as one half-space of its layers in series. Rigid where there is none.
+    /// The guide as one half-space of its layers in series. Rigid if there is none.
     pub fn in_series(&self) -> Body {
         self.guide().map_or_else(Body::rigid, Waveguide::as_body)
     }
 
-    /// The layer that the sample touches, as a half-space. Rigid where there is none.
+    /// The layer that the sample touches, as a half-space. Rigid if there is none.
     pub fn touched(&self) -> Body {
         self.guide().map_or_else(Body::rigid, Waveguide::touched)
     }
 
-    /// The object's size over the size stated: one, with its error.
+    /// The true size of the object relative to the stated one: one, with its error.
     pub fn size(&self) -> Uncertain {
         Uncertain::exact(1.0).by(Source::ObjectSize, self.size_error)
     }
@@ -342,8 +343,8 @@ impl Bodies {
         ratio.by(Source::PoissonRatio, self.poisson_ratio_error)
     }
 
-    /// The guide's compliance over the one stated, under a contact of this radius (m): one, with
-    /// its error. Exact where there is no guide or its contact cannot be solved.
+    /// The guide's true compliance relative to the stated one, for a contact of this radius (m):
+    /// one, with its error. Exact if there is no guide or its contact cannot be solved.
     pub fn guide_compliance(&self, contact_radius_m: f64) -> Uncertain {
         match &self.guide_error {
             GuideError::Common(factor) => *factor,

@@ -1,5 +1,5 @@
-//! Young's modulus from forces and the contacts they make: the estimator of a contact law, and the
-//! laws' names.
+//! Young's modulus from forces and contacts: the estimator of a contact law, and names for the
+//! laws.
 
 use super::bodies::half_angle;
 use super::contact_fit::ContactFit;
@@ -23,7 +23,7 @@ use crate::laws::{ConeLaw, ContactLaw, HertzLaw, LayerLaw, PunchLaw, WaveguideLa
 /// let rigid = HertzSphere::new(5e-3, 0.5)?;
 /// let plain = rigid.estimate(&loads)?;
 ///
-/// // The other body's compliance is subtracted: the sample is stiffer than without.
+/// // Subtracting the compliance of the other body makes the sample stiffer.
 /// let steel = rigid
 ///     .clone()
 ///     .with_other_body(Body::elastic(200e9, 0.3)?)
@@ -37,7 +37,7 @@ use crate::laws::{ConeLaw, ContactLaw, HertzLaw, LayerLaw, PunchLaw, WaveguideLa
 /// assert!(steel.youngs_modulus_pa / plain.youngs_modulus_pa - 1.0 < 1e-6);
 /// assert!(on_gel.youngs_modulus_pa > 1.3 * plain.youngs_modulus_pa);
 ///
-/// // Errors of the ball stand beside the loads.
+/// // Errors of the ball are stated with the loads.
 /// let ball = Bodies::new(Object::sphere(5e-3), None).with_size_error(0.01)?;
 /// let careful = rigid.estimate(&loads.with_bodies(ball))?;
 /// assert!(careful.standard_error_pa > plain.standard_error_pa);
@@ -49,15 +49,15 @@ pub struct ContactEstimator<L> {
     law: L,
     kind: EstimatorKind,
     poisson_ratio: f64,
-    /// `None`: that of the series.
+    /// `None` for the other body of the series.
     other: Option<Body>,
 }
 
 impl<L: ContactLaw> ContactEstimator<L> {
-    /// By a law and the sample's Poisson ratio. The other body is that of the loads'
-    /// [bodies](LoadSeries::bodies), which a pipeline gives: the guide's layers in series, or the
-    /// touched layer for a law with [layers](crate::laws::Limits::layers). Rigid where the loads
-    /// have none.
+    /// Creates an estimator from a law and the sample's Poisson ratio. The other body is that of
+    /// the loads' [bodies](LoadSeries::bodies), which a pipeline supplies: the guide's layers in
+    /// series, or the touched layer for a law with [layers](crate::laws::Limits::layers). It is
+    /// rigid if the loads have none.
     ///
     /// # Errors
     /// [`ElasticityError::PoissonRatio`].
@@ -66,7 +66,7 @@ impl<L: ContactLaw> ContactEstimator<L> {
     /// use tactile_elasticity::laws::{ContactLaw, ContactLength, LogForce, Reach};
     /// use tactile_elasticity::modulus::*;
     ///
-    /// // Hertz's law written anew: ln(F/E*) = ln(4a³/3R).
+    /// // Hertz's law written again: ln(F/E*) = ln(4a³/3R).
     /// struct Ball { radius_m: f64 }
     /// impl ContactLaw for Ball {
     ///     fn log_force(&self, length: ContactLength, _share: f64) -> Reach {
@@ -84,7 +84,8 @@ impl<L: ContactLaw> ContactEstimator<L> {
     /// let own = ContactEstimator::from_law(Ball { radius_m: 5e-3 }, 0.5)?.estimate(&loads)?;
     /// let built_in = HertzSphere::new(5e-3, 0.5)?.estimate(&loads)?;
     /// assert!((own.youngs_modulus_pa / built_in.youngs_modulus_pa - 1.0).abs() < 1e-12);
-    /// // The slope of the law, from which the radius's error follows, was found by differences.
+    /// // The slope of the law, which determines the effect of the radius error, is computed by
+    /// // differences.
     /// assert!((own.standard_error_pa / built_in.standard_error_pa - 1.0).abs() < 1e-7);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
@@ -101,7 +102,7 @@ impl<L: ContactLaw> ContactEstimator<L> {
         })
     }
 
-    /// With a name of its own.
+    /// Sets the name of the estimator.
     ///
     /// ```
     /// use tactile_elasticity::laws::HertzLaw;
@@ -117,24 +118,24 @@ impl<L: ContactLaw> ContactEstimator<L> {
         self
     }
 
-    /// With this other body, whatever the series states.
+    /// Sets the other body, regardless of the series.
     #[must_use]
     pub fn with_other_body(mut self, body: Body) -> Self {
         self.other = Some(body);
         self
     }
 
-    /// With a waveguide as the other body, its layers in series: one half-space of their mean
+    /// Uses a waveguide as the other body, with its layers in series: one half-space of their mean
     /// compliance.
     ///
-    /// Good for a contact that is small beside layers that are alike. [`SphereOnWaveguide`] solves
-    /// the layers.
+    /// This is accurate for a contact that is small compared with similar layers.
+    /// [`SphereOnWaveguide`] solves the layers.
     #[must_use]
     pub fn with_waveguide(self, waveguide: &Waveguide) -> Self {
         self.with_other_body(waveguide.as_body())
     }
 
-    /// The other body: the one stated, or that of the series.
+    /// The other body: the one that was set, or that of the series.
     fn other_body(&self, series: &LoadSeries) -> Body {
         self.other.unwrap_or_else(|| match series.bodies() {
             None => Body::rigid(),
@@ -163,15 +164,15 @@ impl<L: ContactLaw> ModulusEstimator for ContactEstimator<L> {
     }
 }
 
-/// Hertz's sphere: a = (3FR/4E*)^⅓, δ = a²/R. Right for a/R up to 0.3. Beyond, the estimate carries
-/// a warning.
+/// Hertz's sphere: a = (3FR/4E*)^⅓, δ = a²/R. It is valid for a/R up to 0.3; above, the estimate
+/// carries a warning.
 ///
 /// ```
 /// use tactile_elasticity::modulus::{
 ///     Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator,
 /// };
 ///
-/// // 1 mN on a 5 mm sphere makes a contact of 0.4543 mm: 30 kPa.
+/// // 1 mN on a 5 mm sphere gives a contact of 0.4543 mm at 30 kPa.
 /// let load = LoadState::new(Estimate::new(1e-3, 1e-5))
 ///     .with_radius(Estimate::new(0.4543e-3, 1e-6));
 /// let modulus = HertzSphere::new(5e-3, 0.5)?.estimate(&LoadSeries::new([load]))?;
@@ -214,7 +215,7 @@ pub type Cone = ContactEstimator<ConeLaw>;
 /// use tactile_elasticity::contact::{Bond, HertzContact};
 /// use tactile_elasticity::modulus::*;
 ///
-/// // Read as a half-space, a sample 1 mm thin looks far too stiff.
+/// // Treated as a half-space, a sample of 1 mm would appear far too stiff.
 /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
 /// let load = LoadSeries::new([LoadState::new(Estimate::new(1e-3, 1e-5))
 ///     .with_indentation(Estimate::new(contact.indentation_m, 1e-7))]);
@@ -233,15 +234,16 @@ pub type BondedLayer = ContactEstimator<LayerLaw>;
 /// contact with N bonded layers ([`LayerEquation`](crate::contact::LayerEquation)), exact for thick
 /// and thin layers, with a correction for finite strain.
 ///
-/// Range: a/R up to 1.2 and a/h up to 1.6, with a warning beyond. Of finite-element contacts
-/// (neo-Hookean, ν = 0.495) that the correction was not fitted to, on the paper's guide and on
-/// single layers, 30 to 250 kPa, 3 to 20 mm, the modulus from one contact radius is within 0.6 % in
-/// the median and 6.1 % at worst (where the guide takes two thirds of the compliance). Of an
-/// independent program's, within 0.5 % on a rigid flat up to a/R = 0.9 and 1.7 % on the paper's
-/// guide up to 1.07. From the indentation, the approach of the ball's centre, it is within 0.4 % on
-/// the flat and 12 % on the guide. The law's own error is part of the interval.
+/// Range: a/R up to 1.2 and a/h up to 1.6, with a warning outside. It was tested on finite-element
+/// contacts (neo-Hookean, ν = 0.495) that were not used for the correction, on the paper's guide
+/// and on single layers, with 30 to 250 kPa and 3 to 20 mm. The modulus from one contact radius has
+/// a median error of 0.6 % and a maximum of 6.1 % (if the guide has two thirds of the compliance).
+/// For contacts of an independent program, the error is below 0.5 % on a rigid flat up to a/R =
+/// 0.9, and below 1.7 % on the paper's guide up to 1.07. From the indentation, the approach of the
+/// ball's centre, it is below 0.4 % on the flat and 12 % on the guide. The error of the law is part
+/// of the interval.
 ///
-/// The set-up solves some 45 contact radii for a dozen ratios of stiffness. An estimate then
+/// The set-up solves about 45 contact radii for a dozen ratios of stiffness. An estimate then
 /// interpolates.
 ///
 /// ```
@@ -250,7 +252,7 @@ pub type BondedLayer = ContactEstimator<LayerLaw>;
 ///     Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, SphereOnWaveguide,
 /// };
 ///
-/// // On a gel of 2 mm the depth is felt: as on a deep one the ball would be called stiffer.
+/// // A gel of 2 mm stiffens the contact: treated as deep, the ball would appear stiffer.
 /// let gel = Waveguide::new(vec![Layer {
 ///     thickness_m: 2e-3,
 ///     youngs_modulus_pa: 100e3,
@@ -269,7 +271,7 @@ pub type SphereOnWaveguide = ContactEstimator<WaveguideLaw>;
 
 impl ContactEstimator<HertzLaw> {
     /// A sphere of relative radius R (m). The sample, with Poisson ratio ν, is either the sphere or
-    /// what it is pressed into.
+    /// the body that it is pressed into.
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
@@ -344,8 +346,8 @@ impl ContactEstimator<WaveguideLaw> {
         Ok(estimator.with_other_body(waveguide.touched()))
     }
 
-    /// The linear contact alone, without what finite strain adds and without the model's error in
-    /// the interval.
+    /// Uses the linear contact alone, without the finite-strain correction and without the error of
+    /// the model in the interval.
     ///
     /// ```
     /// use tactile_elasticity::contact::{Bond, HertzContact, Waveguide};

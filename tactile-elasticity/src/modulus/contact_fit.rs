@@ -1,11 +1,11 @@
 //! The fit of a contact law to loads.
 //!
-//! Every observation (F, x) gives one ln E* = ln F − ln f(x). Their errors are relative, so that
-//! logarithms make the problem linear. The common mean is the generalised least squares one, with
-//! the covariance of forces (which share a calibration), of lengths (which share a pixel size) and
-//! of the indenter's size carried along. E of the sample follows from 1/E* = (1 − ν²)/E + C, C the
-//! compliance of the waveguide or indenter. The interval is carried through that curve, and is open
-//! above where it reaches C.
+//! Each observation (F, x) gives one ln E* = ln F − ln f(x). Their errors are relative, so the
+//! problem is linear in logarithms. The common mean is the generalised least-squares mean, with the
+//! covariance of forces (which share a calibration), of lengths (which share a pixel size) and of
+//! the indenter's size. The modulus E of the sample follows from 1/E* = (1 − ν²)/E + C, with C the
+//! compliance of the waveguide or indenter. The interval is transformed by this curve, and has no
+//! upper end if it reaches C.
 
 use super::bodies::Bodies;
 use super::estimate::{LoadDiagnostics, ModulusEstimate};
@@ -18,18 +18,19 @@ use crate::error::{ElasticityError, Quantity};
 use crate::laws::{self, ContactLaw, ContactLength, Limits, Reach};
 use tactile_core::{Interval, Source, Uncertain, statistics::quantile_95};
 
-// The share from which the one that belongs to the answer is sought. A ball that yields alone may
-// not reach an indentation that it shares with the layers below.
+// Start of the search for the consistent share. A ball that is compliant alone may not reach an
+// indentation that it shares with the layers below.
 const FIRST_SHARE: f64 = 0.5;
-// Two shares at which a law that feels the share differs.
+// Two shares at which a law that depends on the share differs.
 const OTHER_SHARES: [f64; 2] = [0.25, 0.75];
-// A share moves ln E* by no more than itself over the sample's part: eleven digits of a modulus.
+// A change of the share changes ln E* by at most itself over the sample's part: eleven digits of a
+// modulus.
 const SETTLED_SHARE: f64 = 1e-11;
-// A secant that leaves more of the gap than this is followed by halving the bracket.
+// If a secant leaves more of the gap than this, the bracket is halved next.
 const SLOW: f64 = 0.5;
-// Secants take some five steps, bisection forty.
+// Secants take about five steps, bisection forty.
 const SHARE_STEPS: usize = 100;
-// Where a law does not reach, the bracket of shares is halved down to this.
+// If a law is not defined, the bracket of shares is halved down to this width.
 const SMALLEST_BRACKET: f64 = 1e-9;
 
 /// A law and the loads it is fitted to.
@@ -40,8 +41,8 @@ pub(super) struct ContactFit<'a, L: ?Sized> {
     measured: Vec<Measured>,
     poisson_ratio: f64,
     other_compliance_per_pa: f64,
-    /// ln of the other body's compliance and of the object's size, over those stated: zero, with
-    /// their errors.
+    /// ln of the other body's compliance and of the object's size, relative to the stated values:
+    /// zero, with their errors.
     log_compliance: Uncertain,
     log_size: Uncertain,
     /// ln of 1 − ν² over the one stated: zero, with its error.
@@ -103,8 +104,8 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
         })
     }
 
-    /// The observations that the law reaches with the other body's part of 1/E* given, and the
-    /// loads beyond it.
+    /// The observations within the range of the law, for a given part of the other body in 1/E*,
+    /// and the loads outside the range.
     fn observe(&self, share: f64) -> Result<(Vec<Observation>, Vec<usize>), ElasticityError> {
         let mut all = Vec::with_capacity(self.measured.len());
         let mut beyond = Vec::new();
@@ -155,23 +156,25 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
             .with_model_errors(Source::Law, |i| all[i].law_error)
     }
 
-    /// E of the sample at a given ln E*. `None` where the other body leaves no compliance.
+    /// E of the sample at a given ln E*. `None` if the other body accounts for the whole
+    /// compliance.
     fn sample_modulus(&self, log_reduced: f64) -> Option<f64> {
         let reduced = log_reduced.exp();
         let left = 1.0 - self.other_compliance_per_pa * reduced;
         (left > 0.0).then(|| (1.0 - self.poisson_ratio.powi(2)) * reduced / left)
     }
 
-    /// ln E* with the errors of the other body's compliance C and of ν beside those of the mean.
+    /// ln E* with the errors of the other body's compliance C and of ν in addition to those of the
+    /// mean.
     ///
-    /// With p the sample's part of the compliance, 1 − C E* on a deep body, ln E moves by 1/p of ln
-    /// E*, by (1 − p)/p of ln C and by 1 of ln(1 − ν²). Beside ln E* an error of ln C counts 1 − p
-    /// times, one of ln(1 − ν²) p times.
+    /// Let p be the sample's part of the compliance, 1 − C E* for a deep body. Then ln E changes by
+    /// 1/p per unit of ln E*, by (1 − p)/p per unit of ln C and by 1 per unit of ln(1 − ν²). In
+    /// units of ln E*, an error of ln C has the factor 1 − p, and one of ln(1 − ν²) the factor p.
     fn with_bodies(&self, mean: &CommonMean, sample_part: f64) -> Uncertain {
         mean.mean + self.log_compliance * (1.0 - sample_part) + self.log_lateral * sample_part
     }
 
-    /// The sample's part of the compliance under the mean of the contacts.
+    /// The sample's part of the compliance at the mean of the contacts.
     fn sample_part(&self, all: &[Observation], share: f64) -> f64 {
         let radius = |o: &Observation| match self.measured[o.measured].length {
             ContactLength::Radius(a) => Some(a),
@@ -192,15 +195,15 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
         (self.other_compliance_per_pa * log_reduced.exp()).clamp(0.0, 1.0)
     }
 
-    /// The mean with an assumed share of the other body, moved by `reach` times its 95 % quantile.
+    /// The mean for an assumed share of the other body, shifted by `reach` times its 95 % quantile.
     fn mean_at(&self, share: f64, reach: f64) -> Result<Consistent, ElasticityError> {
         let (observations, beyond) = self.observe(share)?;
         let logs: Vec<f64> = observations.iter().map(|o| o.log_modulus.value).collect();
         let mean = common_mean(&logs, &self.covariance(&observations))?;
         let mut log_reduced = mean.mean.value;
-        // Without a step an infinite error must not become NaN.
+        // Without a shift, an infinite error must not become NaN.
         if reach != 0.0 {
-            // The assumed share is the one that follows only where the law feels it.
+            // The assumed share is consistent only if the law depends on it.
             let share = match self.feels_share {
                 true => share,
                 false => self.share_at(mean.mean.value),
@@ -217,13 +220,13 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
         })
     }
 
-    /// The mean whose assumed share of the other body is the one that follows from it.
+    /// The mean for which the assumed share of the other body equals the resulting share.
     ///
-    /// The share that follows falls while the assumed one rises: the larger the part of a layer on
-    /// a stiff base, the stiffer the contact, and the softer the bodies that make it. Their
-    /// difference has one zero between 0 and 1. It is sought by secants, and by bisection where
-    /// these leave the bracket or are slow. The plain iteration swings for ever where a thin layer
-    /// takes most of the compliance. It begins at the share `from`.
+    /// The resulting share decreases as the assumed one increases: the larger the part of a layer
+    /// on a stiff base, the stiffer the contact, and the softer the bodies that explain it. Their
+    /// difference has one zero between 0 and 1. It is found by secants, and by bisection if these
+    /// leave the bracket or are slow. A fixed-point iteration would oscillate forever if a thin
+    /// layer has most of the compliance. The search starts at the share `from`.
     fn consistent(&self, reach: f64, from: f64) -> Result<Consistent, ElasticityError> {
         if !self.feels_share {
             return self.mean_at(0.0, reach);
@@ -247,16 +250,16 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
             });
             let slow = before.is_some_and(|[_, y]| gap.abs() > SLOW * y.abs());
             before = Some([assumed, gap]);
-            // Near a share of one the gap of an end of the interval may have another zero, so that
-            // secants that are fast are left to themselves.
+            // Near a share of one, the gap at an end of the interval may have another zero, so fast
+            // secants are not interrupted.
             let inside = secant > low && secant < high && secant != assumed;
             let mut next = if inside && !slow {
                 secant
             } else {
                 0.5 * (low + high)
             };
-            // Where the law does not reach, the bracket ends: back towards the share at which it
-            // does.
+            // If the law is not defined, the bracket ends there: step back towards a share at which
+            // it is.
             let mut moved = self.mean_at(next, reach);
             while moved.is_err() && (next - assumed).abs() > SMALLEST_BRACKET {
                 if next < assumed {
@@ -276,7 +279,7 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
     fn answer(&self, centre: &Consistent) -> Result<(Uncertain, Interval), ElasticityError> {
         let known = centre.mean.has_error();
         let limit = |reach: f64| -> Option<f64> {
-            // Beside a share of one the law may not reach.
+            // Near a share of one the law may not be defined.
             let share = self.share_at(centre.log_reduced);
             let from = if share < 1.0 { share } else { FIRST_SHARE };
             self.sample_modulus(self.consistent(reach, from).ok()?.log_reduced)
@@ -294,7 +297,8 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
         let part = self.sample_part(&centre.observations, self.share_at(centre.log_reduced));
         let log = self.with_bodies(&centre.mean, part);
         let found = log.map(|_| modulus, |_| modulus / part);
-        // Errors at rounding level may put an end on the wrong side of the estimate by a rounding.
+        // Errors at rounding level may put an end on the wrong side of the estimate by a rounding
+        // error.
         let upper = upper.map(|upper| upper.max(modulus));
         Ok((found, Interval::new(lower.min(modulus), upper)))
     }
@@ -310,7 +314,7 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
                 ..LoadDiagnostics::default()
             })
             .collect();
-        // Observations come in the order of their loads.
+        // Observations are in the order of their loads.
         let residuals = &centre.mean.standardized_residuals;
         let mut rest = &residuals[..];
         let load = |o: &Observation| self.measured[o.measured].load;
@@ -357,18 +361,18 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
     }
 }
 
-/// A length of a contact, with the force of its load.
+/// A length of a contact with the force of its load.
 struct Measured {
     load: usize,
     force: Uncertain,
     length: ContactLength,
-    /// ln F but for its noise, and ln of the length.
+    /// ln F without its noise, and ln of the length.
     log_common_force: Uncertain,
     log_length: Uncertain,
 }
 
 impl Measured {
-    /// Of all loads, in their order. Forces and lengths must be above zero.
+    /// The lengths of all loads, in order. Forces and lengths must be positive.
     fn all(series: &LoadSeries) -> Result<Vec<Self>, ElasticityError> {
         let log = |number: Uncertain| number.map(f64::ln, f64::recip);
         let mut all = Vec::with_capacity(series.loads().len());
@@ -400,7 +404,7 @@ impl Measured {
     }
 }
 
-/// The mean of the contact radii, measured or by the law from what was.
+/// The mean of the contact radii, either measured or derived by the law.
 fn mean_radius(series: &LoadSeries, limits: &Limits) -> Option<f64> {
     let radius = |state: &LoadState| {
         let measured = state.contact_radius_m.map(|a| a.value);
@@ -412,7 +416,7 @@ fn mean_radius(series: &LoadSeries, limits: &Limits) -> Option<f64> {
     (count > 0).then(|| radii().sum::<f64>() / count as f64)
 }
 
-/// Loads whose a/R is beyond the limit of a law.
+/// Warnings for loads whose a/R is above the limit of a law.
 pub(super) fn large_contacts(loads: &[LoadDiagnostics], limit: f64) -> Vec<Warning> {
     (loads.iter().enumerate())
         .filter_map(|(load, d)| d.contact_ratio.map(|ratio| (load, ratio)))
@@ -421,20 +425,20 @@ pub(super) fn large_contacts(loads: &[LoadDiagnostics], limit: f64) -> Vec<Warni
         .collect()
 }
 
-/// A mean whose share of compliance is its own.
+/// A mean with a consistent share of compliance.
 struct Consistent {
     observations: Vec<Observation>,
-    /// Loads with a length that the law does not reach.
+    /// Loads with a length outside the range of the law.
     beyond: Vec<usize>,
     mean: CommonMean,
     log_reduced: f64,
 }
 
 struct Observation {
-    /// Its place among what was measured.
+    /// Index among the measured lengths.
     measured: usize,
-    /// ln E*, but for the noise of the force and the errors of the law.
+    /// ln E*, without the noise of the force and the errors of the law.
     log_modulus: Uncertain,
-    /// Standard error of ln F that is the law's.
+    /// Standard error of ln F due to the law.
     law_error: f64,
 }
