@@ -1,17 +1,17 @@
-//! Minimum of a function of one variable.
+//! Numerical tools: minimum of a function, quadrature and interpolation.
 
-/// Argument of the least of a function that has one minimum in [low, high]: the better of the last
-/// bracket's two inner points.
+/// The minimum of a function that has only one in [low, high]: the better of the two inner points
+/// of the last bracket.
 ///
-/// Every section takes one evaluation and leaves 0.62 of the bracket. `sections` of them, fewer
-/// where the bracket is down to rounding.
+/// Each section takes one evaluation and leaves 0.62 of the bracket. At most `sections` are made,
+/// and fewer if the bracket reaches rounding.
 pub(crate) fn golden_section(
     mut low: f64,
     mut high: f64,
     sections: usize,
     at: impl Fn(f64) -> f64,
 ) -> f64 {
-    // The part of a bracket that a golden section leaves.
+    // Fraction of a bracket that remains after a golden section.
     let ratio = 0.618_033_988_749_894_8;
     let evaluated = |x: f64| (x, at(x));
     let left = |low: f64, high: f64| evaluated(high - ratio * (high - low));
@@ -32,7 +32,7 @@ pub(crate) fn golden_section(
     if a.1 <= b.1 { a.0 } else { b.0 }
 }
 
-/// Nodes and weights on [0, 1], by Newton's method on P_n from the cosine guess.
+/// Gauss–Legendre nodes and weights on [0, 1], by Newton's method on P_n from the cosine guess.
 pub(crate) fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
     (0..n)
         .map(|i| {
@@ -52,7 +52,7 @@ pub(crate) fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// P_n(x) and P_{n−1}(x).
+/// The Legendre polynomials P_n(x) and P_{n−1}(x).
 fn legendre(n: usize, x: f64) -> (f64, f64) {
     let (mut p, mut previous) = (1.0, 0.0);
     for k in 0..n {
@@ -62,8 +62,8 @@ fn legendre(n: usize, x: f64) -> (f64, f64) {
     (p, previous)
 }
 
-/// Edges from 0 to `end`: panels of width `first` at the origin, growing by half of what lies
-/// before, none above `widest`.
+/// Edges from 0 to `end`. The first panel has the width `first`; each next one is half as wide as
+/// everything before, up to `widest`.
 pub(crate) fn panel_edges(end: f64, first: f64, widest: f64) -> Vec<f64> {
     let mut edges = vec![0.0];
     let mut last = 0.0;
@@ -74,7 +74,7 @@ pub(crate) fn panel_edges(end: f64, first: f64, widest: f64) -> Vec<f64> {
     edges
 }
 
-/// Nodes and weights between the edges, 16 points a panel.
+/// Nodes and weights between the edges, with 16 points per panel.
 pub(crate) fn gauss_panels(edges: &[f64]) -> Vec<(f64, f64)> {
     let unit = gauss_legendre(16);
     edges
@@ -87,7 +87,7 @@ pub(crate) fn gauss_panels(edges: &[f64]) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// The value and slope at `at` of the cubic through four points (Lagrange).
+/// Value and slope at `at` of the cubic through four points (Lagrange).
 pub(crate) fn cubic(points: [(f64, f64); 4], at: f64) -> (f64, f64) {
     let (mut value, mut slope) = (0.0, 0.0);
     for (i, point) in points.iter().enumerate() {
@@ -110,7 +110,7 @@ pub(crate) struct Chebyshev<const N: usize> {
 }
 
 impl<const N: usize> Chebyshev<N> {
-    /// The nodes at which [`through`](Self::through) wants values.
+    /// The nodes at which [`through`](Self::through) needs values.
     pub(crate) fn nodes() -> [f64; N] {
         std::array::from_fn(|j| 0.5 + 0.5 * Self::angle(j).cos())
     }
@@ -127,7 +127,7 @@ impl<const N: usize> Chebyshev<N> {
         Self { coefficients }
     }
 
-    /// By Clenshaw's recurrence.
+    /// Evaluates by Clenshaw's recurrence.
     pub(crate) fn value(&self, x: f64) -> f64 {
         let t = 2.0 * x - 1.0;
         let (mut next, mut after) = (0.0, 0.0);

@@ -1,38 +1,37 @@
-//! Whether a modulus changes with time, and whether it is the sample that relaxes or the sensor
-//! that drifts.
+//! Whether a modulus changes with time, and whether the sample relaxes or the sensor drifts.
 //!
-//! Loads at known times each give a modulus $E_k = F_k/x_k$, where $x_k$ is what the law makes of
-//! the contact's size: for a ball $x \propto a^3$. In a standard linear solid, a spring $E_\infty$
-//! beside a spring $E_0 - E_\infty$ in series with a dashpot,
+//! Loads at known times each give a modulus $E_k = F_k/x_k$, where $x_k$ is derived by the law from
+//! the size of the contact: for a ball $x \propto a^3$. In a standard linear solid, a spring
+//! $E_\infty$ in parallel with a spring $E_0 - E_\infty$ in series with a dashpot,
 //!
 //! $F(t) = \int_0^t E(t - s)\, \mathrm d x(s), \qquad E(t) = E_\infty + (E_0 - E_\infty)\,
 //! e^{-t/\tau}$
 //!
-//! holds for a contact that grows (Lee and Radok, J. Appl. Mech. 27 (1960) 438), and so, whatever
-//! the history,
+//! holds for a growing contact (Lee and Radok, J. Appl. Mech. 27 (1960) 438). For any history it
+//! follows that
 //!
 //! $E_k = E_\infty + (E_0 - E_\infty)\, g_k(x, \tau), \qquad \frac 1 {E_k} = \frac 1 {E_\infty} -
 //! \Bigl(\frac 1 {E_\infty} - \frac 1 {E_0}\Bigr) g_k(F, \tau_c), \qquad g_k(u, \tau) = \frac 1
 //! {u_k} \int_0^{t_k} e^{-(t_k - s)/\tau}\, \mathrm d u(s)$
 //!
 //! with $\tau_c = \tau E_0/E_\infty$. A held approach ($x$ constant) is relaxation, a held force
-//! ($F$ constant) creep. The form is used whose history varies less, since it must be known between
-//! the frames, where it is taken as linear.
+//! ($F$ constant) is creep. Of the two forms, the one whose history varies less is used, because
+//! the history between the frames is unknown and is interpolated linearly.
 //!
-//! A gain that drifts multiplies the forces, and with them the moduli, by $1 + \gamma t$, whatever
-//! the history.
+//! A drifting gain multiplies the forces, and with them the moduli, by $1 + \gamma t$ for any
+//! history.
 //!
 //! # References
 //! R. M. Christensen, *Theory of Viscoelasticity* (1982). R. E. Kass & A. E. Raftery, J. Am. Stat.
-//! Assoc. 90 (1995) 773. R. B. Davies, Biometrika 74 (1987) 33: a time constant that has no meaning
-//! where nothing relaxes makes the likelihood ratio larger than χ².
+//! Assoc. 90 (1995) 773. R. B. Davies, Biometrika 74 (1987) 33: without relaxation the time
+//! constant is meaningless, which makes the likelihood ratio larger than χ².
 
 use crate::error::{ElasticityError, Quantity};
 use crate::numerics::golden_section;
 use nalgebra::{Matrix3, Vector3};
 use tactile_core::{Estimate, Interval, statistics::quantile_95};
 
-/// The modulus that one load gives, and when.
+/// The modulus from one load, with its time.
 ///
 /// ```
 /// use tactile_elasticity::modulus::Estimate;
@@ -55,11 +54,12 @@ pub struct TimedModulus {
     pub time_s: f64,
     /// Normal force.
     pub force_n: f64,
-    /// What this load alone says, with the part of its error that no other load has.
+    /// The modulus from this load alone, with the part of its error that is independent of other
+    /// loads.
     pub youngs_modulus_pa: Estimate,
 }
 
-/// What a series of moduli says of time.
+/// Time dependence of a series of moduli.
 ///
 /// ```
 /// use tactile_elasticity::modulus::Estimate;
@@ -79,7 +79,7 @@ pub struct TimedModulus {
 /// assert!(
 ///     matches!(rising, TimeDependence::Drifts { per_s } if (per_s.value - 0.01).abs() < 0.001)
 /// );
-/// // A gain that falls steadily is what a sample shows that relaxes over hours.
+/// // A sample that relaxes over hours looks like a gain that falls steadily.
 /// let falling = time_dependence(&series(|t| 80e3 * (1.0 - 0.01 * t)), 0.0, 0.0)?;
 /// assert!(
 ///     matches!(falling, TimeDependence::Undecided { change } if (change + 0.08).abs() < 0.01)
@@ -94,27 +94,26 @@ pub struct TimedModulus {
 )]
 #[non_exhaustive]
 pub enum TimeDependence {
-    /// No change that the errors would not explain (one such series in a hundred is told as one of
-    /// the others).
+    /// No change beyond the errors (one constant series in a hundred is classified as one of the
+    /// others).
     Steady,
     /// The sample relaxes as a standard linear solid.
     Relaxes(StandardLinearSolid),
-    /// The sensor's gain rises, in proportion to time.
+    /// The gain of the sensor rises in proportion to time.
     Drifts {
-        /// Relative change of the gain in a second.
+        /// Relative change of the gain per second.
         per_s: Estimate,
     },
-    /// The moduli change with time and either may be the reason: too few loads, a fall in
-    /// proportion to time (a falling gain, or a time constant longer than the loads last), or a
-    /// change that neither explains.
+    /// The moduli change with time for an undetermined reason: there are too few loads, the moduli
+    /// fall in proportion to time (a falling gain, or a time constant longer than the series), or
+    /// neither model explains the change.
     Undecided {
         /// Relative change from the first load to the last.
         change: f64,
     },
 }
 
-/// E(t) = E∞ + (E₀ − E∞) exp(−t/τ), each parameter with its 95 % interval by the profile of the
-/// likelihood.
+/// E(t) = E∞ + (E₀ − E∞) exp(−t/τ). Each parameter has a 95 % profile-likelihood interval.
 ///
 /// ```
 /// use tactile_elasticity::modulus::Estimate;
@@ -148,54 +147,54 @@ pub enum TimeDependence {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct StandardLinearSolid {
-    /// E₀, that of a load too fast to relax.
+    /// E₀, the modulus of a load too fast to relax.
     pub instantaneous_pa: f64,
     /// Interval of E₀.
     pub instantaneous_95_pa: Interval,
-    /// E∞, that of a load held for ever.
+    /// E∞, the modulus of a load held indefinitely.
     pub equilibrium_pa: f64,
     /// Interval of E∞.
     pub equilibrium_95_pa: Interval,
-    /// τ, of the relaxation under a held approach. Under a held force it creeps with τ E₀/E∞.
+    /// τ of the relaxation under a held approach. Under a held force the creep time is τ E₀/E∞.
     pub time_constant_s: f64,
     /// Interval of τ.
     pub time_constant_95_s: Interval,
 }
 
-// Loads at different times below which three parameters of a solid leave nothing that could speak
-// against it.
+// Minimum number of different times: with fewer, the three parameters of a solid leave no test of
+// the fit.
 const FEWEST_LOADS: usize = 5;
 
-// What the likelihood ratio of a change against none must exceed. With the time constant free it
-// is no χ²: chosen by simulation of constant series, of which about 1 % exceed it (`cargo test -p
-// tactile-elasticity --test suite false_alarms -- --nocapture`).
+// Threshold of the likelihood ratio of a change against none. With a free time constant it does not
+// follow χ². The value was chosen by simulation of constant series, of which about 1 % exceed it
+// (`cargo test -p tactile-elasticity --test suite false_alarms -- --nocapture`).
 const CHANGE: f64 = 8.0;
 
-// What a trend alone must exceed where a solid is not tried: χ² of one degree of freedom at 1 %.
+// Threshold of a trend alone if no solid is fitted: χ² with one degree of freedom at 1 %.
 const TREND: f64 = 6.63;
 
-// Difference of Bayes' information criterion that is strong evidence (Kass & Raftery 1995, Table
-// in § 3.2).
+// Difference of the Bayesian information criterion that is strong evidence (Kass & Raftery 1995,
+// table in § 3.2).
 const STRONG_EVIDENCE: f64 = 6.0;
 
-/// Tells a sample that relaxes from a sensor that drifts, from the moduli of single loads in the
+/// Distinguishes a relaxing sample from a drifting sensor, from the moduli of single loads in the
 /// order of time.
 ///
-/// `scale_error` is the relative standard error that all moduli share: it widens the intervals of
-/// E₀ and E∞. `law_error` is the relative error of the law that gave the moduli: between loads that
-/// differ by a factor of e they are taken to differ by as much, so that a load that grows with time
-/// is not mistaken for time.
+/// `scale_error` is the relative standard error common to all moduli, which widens the intervals of
+/// E₀ and E∞. `law_error` is the relative error of the law behind the moduli: it is the assumed
+/// difference between loads that differ by a factor of e, so that an increasing load is not
+/// mistaken for an effect of time.
 ///
-/// Needs five loads at different times. Of fewer only a significant trend is reported, as
-/// [`TimeDependence::Undecided`]. A solid is told where the likelihood ratio against a constant
-/// exceeds 8 (1 % of constant series do), Bayes' criterion prefers it to a drift by more than 6,
-/// and its time constant is no longer than the loads lasted. Where the moduli scatter about the
-/// best solid by more than their errors, these are scaled up. O(n) for each of some 400 time
-/// constants.
+/// Five loads at different times are needed. With fewer, only a significant trend is reported, as
+/// [`TimeDependence::Undecided`]. A solid is reported if the likelihood ratio against a constant
+/// exceeds 8 (1 % of constant series do), the Bayesian criterion prefers it to a drift by more than
+/// 6, and its time constant does not exceed the duration of the series. If the moduli scatter about
+/// the best solid by more than their errors, the errors are scaled up. O(n) for each of about 400
+/// time constants.
 ///
 /// # Errors
-/// [`ElasticityError::TooFewLoads`] of none, [`ElasticityError::NotPositive`] for forces, moduli
-/// and their errors, [`ElasticityError::Negative`] for times and for the two errors,
+/// [`ElasticityError::TooFewLoads`] without loads, [`ElasticityError::NotPositive`] for forces,
+/// moduli and their errors, [`ElasticityError::Negative`] for times and for the two errors,
 /// [`ElasticityError::TimeDecreases`].
 ///
 /// ```
@@ -208,7 +207,7 @@ const STRONG_EVIDENCE: f64 = 6.0;
 ///     force_n: 0.7,
 ///     youngs_modulus_pa: Estimate::new(1e3 * kpa, 200.0),
 /// };
-/// // Three loads say that something changed, not what.
+/// // Three loads reveal a change, but not its cause.
 /// let few = time_dependence(&[at(0.0, 100.0), at(1.0, 97.0), at(2.0, 95.0)], 0.0, 0.0)?;
 /// assert!(matches!(few, TimeDependence::Undecided { change } if (change + 0.05).abs() < 0.01));
 /// let back = time_dependence(&[at(1.0, 100.0), at(0.0, 97.0)], 0.0, 0.0).unwrap_err();
@@ -246,8 +245,7 @@ pub fn time_dependence(
     let best = profile.best();
     let count = moduli.len() as f64;
     let least = best.map_or(f64::INFINITY, |(_, line)| line.chi_squared);
-    // Scatter beyond the errors about whichever explains more. Constants, trends and solids share
-    // it.
+    // Scatter beyond the errors about the better model, common to constants, trends and solids.
     let excess = (least / (count - 3.0))
         .min(trend.chi_squared / (count - 2.0))
         .max(1.0);
@@ -274,7 +272,7 @@ pub fn time_dependence(
     Ok(undecided(&series, &trend))
 }
 
-/// The number of different times. Refuses what no series can have.
+/// The number of different times. Rejects invalid series.
 fn checked_times(moduli: &[TimedModulus]) -> Result<usize, ElasticityError> {
     let mut different = 0;
     let mut before_s = f64::NEG_INFINITY;
@@ -320,17 +318,17 @@ fn undecided(series: &Series, trend: &Line) -> TimeDependence {
     }
 }
 
-/// Which of the two the history is taken of: what varies less is better known between the loads.
+/// Whose history is used: the quantity that varies less is better known between the loads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Form {
-    /// E on the history of the deformation.
+    /// E, with the history of the deformation.
     Relaxation,
-    /// 1/E on the history of the force.
+    /// 1/E, with the history of the force.
     Creep,
 }
 
 impl Form {
-    /// E of what is fitted, or that of E.
+    /// Converts the fitted response, E or 1/E, to E.
     fn modulus(self, response: f64) -> f64 {
         match self {
             Self::Relaxation => response,
@@ -339,7 +337,7 @@ impl Form {
     }
 }
 
-/// Moduli ready to be fitted.
+/// Moduli prepared for the fits.
 struct Series {
     form: Form,
     times_s: Vec<f64>,
@@ -348,12 +346,12 @@ struct Series {
     response: Vec<f64>,
     /// Standard errors of the response.
     sigma: Vec<f64>,
-    /// What one standard error of the law adds to each response: nothing at the mean load, the
-    /// whole at e times the mean.
+    /// Effect of one standard error of the law on each response: zero at the mean load, and the
+    /// full error at e times the mean.
     law: Vec<f64>,
 }
 
-/// y = a + b g beside the law's own slope.
+/// y = a + b g, with the slope of the law fitted too.
 #[derive(Clone, Copy, Debug)]
 struct Line {
     a: f64,
@@ -413,7 +411,7 @@ impl Series {
         self.line(&self.times_s)
     }
 
-    /// y = a + b g(τ). None where no solid with this time constant does that: E∞ or E₀ would not be
+    /// y = a + b g(τ). `None` if it is not a solid with this time constant: E∞ or E₀ would not be
     /// positive, or E would rise.
     fn solid(&self, time_constant_s: f64) -> Option<Line> {
         let line = self.line(&memory(&self.times_s, &self.held, time_constant_s));
@@ -425,7 +423,7 @@ impl Series {
         (falls && fresh > 0.0 && settled > 0.0).then_some(line)
     }
 
-    /// Weighted least squares. The law's slope has a standard normal prior. A column that vanishes
+    /// Weighted least squares. The slope of the law has a standard normal prior. A vanishing column
     /// gets the coefficient zero.
     fn line(&self, column: &[f64]) -> Line {
         let mut normal = Matrix3::zeros();
@@ -439,8 +437,8 @@ impl Series {
             right += row * y;
         }
         normal[(2, 2)] += 1.0;
-        // A column without contrast to the mean carries nothing. Its coefficient must not blow up
-        // with rounding.
+        // A column that hardly differs from its mean carries no information. Its coefficient must
+        // not grow by rounding.
         let contrast = normal[(1, 1)] - normal[(0, 1)].powi(2) / normal[(0, 0)];
         let told = contrast > CONTRAST * normal[(1, 1)] && scale > 0.0;
         if !told {
@@ -470,12 +468,12 @@ impl Series {
     }
 }
 
-// Share of a column's weight that must differ from its mean: below, the normal equations have lost
-// half their digits.
+// Minimum fraction of a column's weight that differs from its mean. Below, the normal equations
+// have lost half of their digits.
 const CONTRAST: f64 = 1e-10;
 
-/// A deformation that scatters no more than its errors was held: its mean. Noise in the history
-/// would count as relaxation.
+/// If a deformation scatters no more than its errors, it was held: returns its mean. Noise in the
+/// history would count as relaxation.
 fn without_noise(deformations: Vec<f64>, relative_errors: &[f64]) -> Vec<f64> {
     let count = deformations.len() as f64;
     let centre = mean(deformations.iter().copied());
@@ -501,11 +499,11 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     values.sum::<f64>() / count
 }
 
-// Time constants tried, from a tenth of the shortest interval to ten times the whole, in
+// Number of time constants tried, from a tenth of the shortest interval to ten times the whole, in
 // logarithmic steps.
 const STEPS: usize = 200;
 
-/// χ² as a function of the time constant alone, the other parameters fitted.
+/// χ² as a function of the time constant, with the other parameters fitted.
 struct Profile<'a> {
     series: &'a Series,
     shortest_s: f64,
@@ -534,7 +532,7 @@ impl<'a> Profile<'a> {
             .map_or(f64::INFINITY, |line| line.chi_squared)
     }
 
-    /// The best time constant, and the parameters there: the least of the steps, refined by golden
+    /// The best time constant with its parameters: the best of the steps, refined by golden
     /// sections.
     fn best(&self) -> Option<(f64, Line)> {
         let (low, high) = (self.shortest_s.ln(), self.longest_s.ln());
@@ -543,7 +541,7 @@ impl<'a> Profile<'a> {
         let least = (0..=STEPS)
             .map(on_grid)
             .min_by(|x, y| self.chi_squared(*x).total_cmp(&self.chi_squared(*y)))?;
-        // Each section leaves 0.62 of the last: 40 leave 1e-8 of a step.
+        // Each section leaves 0.62 of the bracket: after 40, 1e-8 of a step remains.
         let middle = golden_section((least - step).max(low), (least + step).min(high), 40, |x| {
             self.chi_squared(x)
         });
@@ -554,8 +552,8 @@ impl<'a> Profile<'a> {
         Some((refined.exp(), self.at(refined)?))
     }
 
-    /// Where χ² has risen by `room` on one side of the best. None where it does not before the last
-    /// time constant tried.
+    /// The time constant at which χ² has risen to the allowed value on one side of the best. `None`
+    /// if it does not rise as far within the range tried.
     fn limit(&self, best: f64, end: f64, allowed: f64) -> Option<f64> {
         let step = (end - best) / STEPS as f64;
         let outside = (1..=STEPS)
@@ -573,11 +571,11 @@ impl<'a> Profile<'a> {
         Some(inside)
     }
 
-    /// The solid with its intervals. None where the longest time constant tried still fits.
+    /// The solid with its intervals. `None` if the longest time constant tried still fits.
     ///
-    /// At a fixed τ the fit is linear, so that a combination q of its parameters may lie within √(Δ
-    /// − χ²(τ) + χ²_min) of its standard errors: the interval of q is the union over all τ within
-    /// theirs.
+    /// At a fixed τ the fit is linear, so a combination q of its parameters may deviate by √(Δ −
+    /// χ²(τ) + χ²_min) of its standard errors. The interval of q is the union of these over all τ
+    /// in the interval of τ.
     fn solid(&self, excess: f64, count: f64, scale_error: f64) -> Option<StandardLinearSolid> {
         let (time_constant_s, best) = self.best()?;
         let learnt = (excess > 1.0).then_some(count - 3.0);
@@ -629,8 +627,8 @@ impl<'a> Profile<'a> {
         })
     }
 
-    /// The time constant of relaxation with its standard error at a fixed time constant of the fit:
-    /// the same, or of creep that times E∞/E₀.
+    /// The time constant of relaxation with its standard error, for a fixed time constant of the
+    /// fit: the same value, or for creep its product with E∞/E₀.
     fn relaxation_time(&self, time_constant_s: f64, line: &Line) -> (f64, f64) {
         match self.series.form {
             Form::Relaxation => (time_constant_s, 0.0),
@@ -665,20 +663,20 @@ impl Range {
         self.upper = self.upper.max(value + reach * error);
     }
 
-    /// The interval of one over what is positive.
+    /// The interval of the reciprocal of a positive quantity.
     fn inverse(self) -> Self {
         Self {
             lower: 1.0 / self.upper,
-            // Of zero and below: infinity.
+            // Infinity if the lower end is zero or negative.
             upper: 1.0 / self.lower.max(0.0),
         }
     }
 }
 
-/// g_k(u, τ) = (1/u_k) ∫₀^{t_k} e^{−(t_k − s)/τ} du(s), and what of it a change of u_k alone adds,
-/// O(n).
+/// g_k(u, τ) = (1/u_k) ∫₀^{t_k} e^{−(t_k − s)/τ} du(s), and the part added by a change of u_k
+/// alone, in O(n).
 ///
-/// The first load is put on at time 0 and kept. Between loads u is linear.
+/// The first load is applied at time 0 and kept. Between loads u is linear.
 fn memory(times_s: &[f64], held: &[f64], time_constant_s: f64) -> Vec<f64> {
     let mut remaining = 0.0;
     let mut before = (0.0, 0.0);
@@ -686,8 +684,8 @@ fn memory(times_s: &[f64], held: &[f64], time_constant_s: f64) -> Vec<f64> {
         let (last_s, last) = before;
         let elapsed = (time_s - last_s) / time_constant_s;
         let decay = (-elapsed).exp();
-        // Of the first load all is put on at the start. Of a later one's change what a steady
-        // growth leaves, (1 − e^{−u})/u.
+        // The first load is applied completely at the start. A later change is a steady growth,
+        // which leaves (1 − e^{−u})/u.
         let growth = match (last > 0.0, elapsed > 0.0) {
             (false, _) => decay,
             (true, false) => 1.0,

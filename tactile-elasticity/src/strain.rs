@@ -15,11 +15,12 @@ use crate::error::{ElasticityError, Quantity};
 use nalgebra::Matrix3;
 use std::ops::Deref;
 
-/// A way to measure strain: a symmetric tensor that vanishes when the material only moves and turns
-/// (the infinitesimal one: only moves).
+/// A strain measure: a symmetric tensor that vanishes under translation and rotation (for the
+/// infinitesimal one, under translation only).
 ///
-/// Object safe, and a boxed or shared one is one too, so that a program can choose at run time.
-/// Cost: Green–Lagrange and infinitesimal some 10 ns, the others a small eigenvalue problem.
+/// The trait is object safe, and boxed or shared measures implement it, so that a program can
+/// choose at run time. Green–Lagrange and infinitesimal strain take about 10 ns, the others a small
+/// eigenvalue problem.
 ///
 /// ```
 /// use nalgebra::Matrix3;
@@ -35,21 +36,21 @@ pub trait StrainMeasure: Send + Sync {
     /// The strain of a deformation.
     ///
     /// # Errors
-    /// [`ElasticityError::NotFinite`]. And for the measures that need F⁻¹ or U to exist,
-    /// [`ElasticityError::SingularDeformation`] and [`ElasticityError::InvertedDeformation`].
+    /// [`ElasticityError::NotFinite`]. For measures that need F⁻¹ or U, also
+    ///  [`ElasticityError::SingularDeformation`] and [`ElasticityError::InvertedDeformation`].
     ///
     /// ```
     /// use nalgebra::Matrix3;
     /// use tactile_elasticity::strain::{Deformation, Hencky, StrainMeasure};
     ///
-    /// // Inside out there is no logarithm.
+    /// // An inverted deformation has no logarithm.
     /// let inverted =
     ///     Deformation::from_deformation_gradient(Matrix3::from_diagonal_element(-1.0_f64));
     /// assert!(Hencky.of(&inverted).is_err());
     /// ```
     fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError>;
 
-    /// The measure's name, as the field writes it.
+    /// The name of the measure as used in the literature.
     ///
     /// ```
     /// use tactile_elasticity::strain::{GreenLagrange, Hencky, StrainMeasure};
@@ -59,19 +60,19 @@ pub trait StrainMeasure: Send + Sync {
     /// ```
     fn name(&self) -> &'static str;
 
-    /// The strain of a displacement gradient H (F = I + H). Errors as [`of`](Self::of).
+    /// The strain of a displacement gradient H (F = I + H). Errors are those of [`of`](Self::of).
     fn strain(&self, h: &Matrix3<f64>) -> Result<Matrix3<f64>, ElasticityError> {
         self.of(&Deformation::from_displacement_gradient(*h))
     }
 
-    /// The stress that does the work of a nominal stress P on this measure, along an axis that is
-    /// stretched by λ: S de = P dλ. The second Piola–Kirchhoff stress for Green–Lagrange.
+    /// The stress conjugate to this measure for a nominal stress P along an axis with stretch λ: S
+    /// de = P dλ. For Green–Lagrange it is the second Piola–Kirchhoff stress.
     ///
-    /// dλ/de is found by differences, to 10⁻¹¹.
+    /// dλ/de is computed by differences, to 10⁻¹¹.
     ///
     /// # Errors
-    /// [`ElasticityError::NoConjugateStress`] if the strain along the axis depends on the stretches
-    /// across it or does not grow with λ, and those of [`of`](Self::of).
+    /// [`ElasticityError::NoConjugateStress`] if the strain along the axis depends on the
+    /// transverse stretches or does not increase with λ, and those of [`of`](Self::of).
     ///
     /// ```
     /// use tactile_elasticity::strain::{GreenLagrange, Hencky, StrainMeasure};
@@ -101,13 +102,13 @@ pub trait StrainMeasure: Send + Sync {
     }
 }
 
-// Half the step of a stretch for dλ/de: the third derivative times its square is left.
+// Half the step of a stretch for dλ/de. The error is the third derivative times its square.
 const AXIAL_STEP: f64 = 1e-5;
-// A stretch across the axis, and the strain along it that is more than rounding.
+// Step of a transverse stretch, and the strain along the axis that counts as more than rounding.
 const LATERAL_STEP: f64 = 0.01;
 const LATERAL_COUPLING: f64 = 1e-9;
 
-/// Boxed, shared and borrowed measures.
+/// Implements the trait for boxed, shared and borrowed measures.
 impl<P: Deref<Target: StrainMeasure> + Send + Sync> StrainMeasure for P {
     fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
         (**self).of(deformation)
@@ -128,8 +129,8 @@ impl<P: Deref<Target: StrainMeasure> + Send + Sync> StrainMeasure for P {
 
 /// E = ½(FᵀF − I) = ½(H + Hᵀ + HᵀH): Lagrangian, conjugate to the second Piola–Kirchhoff stress.
 ///
-/// (26)–(30) of the paper print the exponents 3 for 2, and f for the map of positions, so that ∇u =
-/// ∇f − I.
+/// In (26)–(30) the paper prints exponents 3 instead of 2. There f is the map of positions, so that
+/// ∇u = ∇f − I.
 ///
 /// ```
 /// use nalgebra::Matrix3;
@@ -143,7 +144,7 @@ impl<P: Deref<Target: StrainMeasure> + Send + Sync> StrainMeasure for P {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct GreenLagrange;
 
-/// e = ½(I − F⁻ᵀF⁻¹) = F⁻ᵀ E F⁻¹: Eulerian, of the deformed state.
+/// e = ½(I − F⁻ᵀF⁻¹) = F⁻ᵀ E F⁻¹: Eulerian, in the deformed state.
 ///
 /// ```
 /// use nalgebra::Matrix3;
@@ -157,13 +158,14 @@ pub struct GreenLagrange;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct EulerAlmansi;
 
-/// ln U, the logarithmic strain in material axes: its trace is ln J, and coaxial steps add up.
+/// ln U, the logarithmic strain in material axes. Its trace is ln J, and coaxial steps are
+/// additive.
 ///
 /// ```
 /// use nalgebra::Matrix3;
 /// use tactile_elasticity::strain::{Hencky, StrainMeasure};
 ///
-/// // Steps that stretch the same axes add up: 10 % twice is 21 % once.
+/// // Steps along the same axes are additive: 10 % twice is 21 % once.
 /// let strain = |stretch: f64| {
 ///     Hencky
 ///         .strain(&Matrix3::from_diagonal_element(stretch))
@@ -181,7 +183,7 @@ pub struct Hencky;
 /// use nalgebra::Matrix3;
 /// use tactile_elasticity::strain::{Biot, StrainMeasure};
 ///
-/// // A turn by a right angle with 5 % of stretch: the turn does not count.
+/// // A rotation by 90° with a stretch of 5 %: the rotation has no effect.
 /// let turned =
 ///     Matrix3::new(0.0, -1.05, 0.0, 1.05, 0.0, 0.0, 0.0, 0.0, 1.05) - Matrix3::identity();
 /// assert!((Biot.strain(&turned)?[(0, 0)] - 0.05_f64).abs() < 1e-15);
@@ -190,13 +192,13 @@ pub struct Hencky;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Biot;
 
-/// ε = ½(H + Hᵀ): linear in the displacement, wrong by the rotation squared.
+/// ε = ½(H + Hᵀ): linear in the displacement, with an error of second order in the rotation.
 ///
 /// ```
 /// use nalgebra::{Matrix3, Rotation3, Vector3};
 /// use tactile_elasticity::strain::{Infinitesimal, StrainMeasure};
 ///
-/// // A mere turn by 0.1 rad is taken for a squeeze of 1 − cos 0.1.
+/// // A pure rotation by 0.1 rad appears as a compression of 1 − cos 0.1.
 /// let turn = Rotation3::new(Vector3::z() * 0.1_f64).into_inner() - Matrix3::identity();
 /// assert!((Infinitesimal.strain(&turn)?[(0, 0)] - (0.1_f64.cos() - 1.0)).abs() < 1e-15);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -280,7 +282,7 @@ fn finite(deformation: &Deformation) -> Result<&Deformation, ElasticityError> {
     }
 }
 
-/// Refuses det F ≤ 0.
+/// Rejects det F ≤ 0.
 fn upright(deformation: &Deformation) -> Result<(), ElasticityError> {
     let determinant = finite(deformation)?.jacobian();
     if determinant > 0.0 {
@@ -292,10 +294,10 @@ fn upright(deformation: &Deformation) -> Result<(), ElasticityError> {
     }
 }
 
-/// F = I + H at a point, given by either, and the other rounded.
+/// F = I + H at a point. One of the two is given exactly, and the other is rounded.
 ///
-/// Strains of 10⁻¹² and below live in H and are lost when F is formed. Stretches of 10⁻⁸ live in F
-/// and are lost when H is. Every measure asks for whichever keeps its digits.
+/// Strains of 10⁻¹² and below are exact in H and lost if F is formed. Stretches of 10⁻⁸ are exact
+/// in F and lost if H is formed. Each measure uses the one that keeps its digits.
 ///
 /// ```
 /// use nalgebra::Matrix3;
@@ -310,7 +312,7 @@ pub struct Deformation {
     given: Given,
 }
 
-/// Which of the two is exact.
+/// Which of F and H is exact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Given {
     F,
@@ -318,7 +320,8 @@ enum Given {
 }
 
 impl Deformation {
-    /// From H = ∂u/∂X, row = component of u, column = direction of the derivative.
+    /// Creates the deformation from H = ∂u/∂X: row = component of u, column = direction of the
+    /// derivative.
     pub fn from_displacement_gradient(h: Matrix3<f64>) -> Self {
         Self {
             f: h + Matrix3::identity(),
@@ -327,7 +330,7 @@ impl Deformation {
         }
     }
 
-    /// From F = ∂x/∂X, the Jacobian of a map of positions.
+    /// Creates the deformation from F = ∂x/∂X, the Jacobian of a map of positions.
     ///
     /// ```
     /// use nalgebra::Matrix3;
@@ -369,7 +372,7 @@ impl Deformation {
         }
     }
 
-    /// J = det F. Negative where the material is turned inside out.
+    /// J = det F. Negative if the material is inverted.
     pub fn jacobian(&self) -> f64 {
         match self.given {
             Given::F => determinant(&self.f).value(),
@@ -393,8 +396,8 @@ impl Deformation {
         sum.add(h[(0, 0)]).add(h[(1, 1)]).add(h[(2, 2)]).value()
     }
 
-    /// F⁻¹ by cofactors whose differences of products are summed in double-double. None where det F
-    /// = 0.
+    /// F⁻¹ by cofactors, whose differences of products are summed in double-double precision.
+    /// `None` if det F = 0.
     pub(crate) fn inverse(&self) -> Option<Matrix3<f64>> {
         let f = &self.f;
         let det = determinant(f).value();
@@ -409,8 +412,8 @@ impl Deformation {
         }))
     }
 
-    /// E = ½(H + Hᵀ + HᵀH), summed in double-double where the terms cancel (large rotation, little
-    /// strain).
+    /// E = ½(H + Hᵀ + HᵀH), summed in double-double precision if the terms cancel (large rotation,
+    /// small strain).
     fn green_lagrange(&self) -> Matrix3<f64> {
         let plain = green_lagrange_plain(&self.h);
         if cancels(&self.h, &plain) {
@@ -454,7 +457,7 @@ fn green_lagrange_plain(h: &Matrix3<f64>) -> Matrix3<f64> {
     Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
 }
 
-/// tr H + II(H) + det H in working precision, and the sum of the terms' sizes.
+/// tr H + II(H) + det H in working precision, and the sum of the absolute terms.
 fn volume_change_plain(h: &Matrix3<f64>) -> [f64; 2] {
     let mut sums = [0.0; 2];
     let mut add = |term: f64| sums = [sums[0] + term, sums[1] + term.abs()];
@@ -470,11 +473,11 @@ fn volume_change_plain(h: &Matrix3<f64>) -> [f64; 2] {
     sums
 }
 
-/// A sum that is smaller by this factor than what it was summed from has lost two digits, and is
-/// summed again in double-double.
+/// If a sum is smaller than its terms by this factor, it has lost two digits and is summed again in
+/// double-double precision.
 const CANCELLED: f64 = 128.0;
 
-/// Whether E is so much smaller than what it was summed from that more than two digits are gone.
+/// Whether E is so much smaller than its terms that more than two digits are lost.
 #[inline(always)]
 fn cancels(h: &Matrix3<f64>, e: &Matrix3<f64>) -> bool {
     // Summed as trees: a chain of additions would take longer than the strain itself.
@@ -496,12 +499,12 @@ fn determinant(m: &Matrix3<f64>) -> DoubleDouble {
     sum
 }
 
-// Sums of products carried in twice the working precision.
+// Sums of products in twice the working precision.
 //
 // Knuth's two-sum and the fused two-product (Ogita, Rump & Oishi 2005, "Accurate sum and dot
 // product").
 
-/// An unevaluated sum `hi + lo`, |lo| no more than half an ulp of `hi`.
+/// An unevaluated sum `hi + lo` with |lo| at most half an ulp of `hi`.
 #[derive(Clone, Copy, Debug)]
 struct DoubleDouble {
     hi: f64,
@@ -562,7 +565,7 @@ impl DoubleDouble {
     }
 }
 
-/// The right stretch U in its principal axes, largest stretch first.
+/// The right stretch U in its principal axes, with the largest stretch first.
 ///
 /// ```
 /// use nalgebra::{Matrix3, Vector3};
@@ -581,20 +584,20 @@ impl DoubleDouble {
 pub struct PrincipalStretches {
     /// λᵢ, the singular values of F.
     pub stretches: [f64; 3],
-    /// λᵢ − 1, without cancellation where the strain is small.
+    /// λᵢ − 1, without cancellation if the strain is small.
     pub elongations: [f64; 3],
-    /// ln λᵢ, likewise. −∞ where λᵢ = 0.
+    /// ln λᵢ, also without cancellation. −∞ if λᵢ = 0.
     pub logarithms: [f64; 3],
     /// Column i is the material direction vᵢ, of length 1.
     pub directions: Matrix3<f64>,
 }
 
 impl From<&Deformation> for PrincipalStretches {
-    /// Of a deformation. Needs finite entries.
+    /// Computes the stretches of a deformation, whose entries must be finite.
     ///
-    /// Near the identity they come from the eigenvalues 2E of C − I, which keeps every digit of a
-    /// tiny strain. Elsewhere from the singular values of F by one-sided Jacobi, which keeps every
-    /// digit of a tiny stretch.
+    /// Near the identity they come from the eigenvalues 2E of C − I, which keep every digit of a
+    /// tiny strain. Otherwise they come from the singular values of F by one-sided Jacobi
+    /// rotations, which keep every digit of a tiny stretch.
     fn from(deformation: &Deformation) -> Self {
         let e = deformation.green_lagrange();
         let largest = e.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
@@ -641,7 +644,7 @@ impl PrincipalStretches {
     }
 }
 
-/// Rotation (c, s) that makes the off-diagonal of [[app, apq], [apq, aqq]] vanish.
+/// Rotation (c, s) that makes the off-diagonal entry of [[app, apq], [apq, aqq]] vanish.
 fn jacobi_rotation(app: f64, aqq: f64, apq: f64) -> (f64, f64, f64) {
     let theta = (aqq - app) / (2.0 * apq);
     let t = 1.0 / (theta.abs() + (theta * theta + 1.0).sqrt());
@@ -738,7 +741,7 @@ fn sorted(values: [f64; 3], v: Matrix3<f64>) -> ([f64; 3], Matrix3<f64>) {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Invariants {
-    /// I₁, for a small strain the relative change of volume.
+    /// I₁. For a small strain it is the relative change of volume.
     pub first: f64,
     /// I₂.
     pub second: f64,
@@ -747,7 +750,7 @@ pub struct Invariants {
 }
 
 impl From<&Matrix3<f64>> for Invariants {
-    /// Of a tensor.
+    /// Computes the invariants of a tensor.
     fn from(a: &Matrix3<f64>) -> Self {
         let minor = |i: usize, j: usize| a[(i, i)] * a[(j, j)] - a[(i, j)] * a[(j, i)];
         Self {
@@ -758,14 +761,13 @@ impl From<&Matrix3<f64>> for Invariants {
     }
 }
 
-/// The Green–Lagrange strain of every displacement gradient, written to `strains`. Allocates
-/// nothing.
+/// Writes the Green–Lagrange strain of each displacement gradient to `strains`. Allocates nothing.
 ///
-/// The same bits as [`GreenLagrange`] one at a time. A gradient that is not finite gives NaN there
-/// and leaves its neighbours alone.
+/// The results equal those of single calls of [`GreenLagrange`] bit by bit. A gradient that is not
+/// finite gives NaN and does not affect its neighbours.
 ///
 /// # Errors
-/// [`ElasticityError::LengthMismatch`] where the slices differ in length.
+/// [`ElasticityError::LengthMismatch`] if the slices differ in length.
 ///
 /// ```
 /// use nalgebra::Matrix3;
@@ -785,10 +787,10 @@ pub fn green_lagrange_into(
     Ok(())
 }
 
-/// [`green_lagrange_into`] over rayon's threads: the same bits.
+/// [`green_lagrange_into`] on the threads of rayon, with bitwise equal results.
 ///
 /// # Errors
-/// As [`green_lagrange_into`].
+/// Those of [`green_lagrange_into`].
 ///
 /// ```
 /// use nalgebra::Matrix3;

@@ -9,9 +9,9 @@ use tactile_core::{Interval, Uncertain};
 
 /// Estimates Young's modulus from a series of loads.
 ///
-/// An estimator holds what is known of the object. What was measured, with its errors, comes with
-/// the [`LoadSeries`]. One estimator therefore serves any number of series, and a boxed or shared
-/// one is an estimator as well.
+/// An estimator holds the prior knowledge of the object. The measurements and their errors come
+/// with the [`LoadSeries`], so one estimator serves any number of series. A boxed or shared
+/// estimator also implements the trait.
 ///
 /// ```
 /// use tactile_elasticity::modulus::{
@@ -34,10 +34,10 @@ pub trait ModulusEstimator: Send + Sync {
     /// Young's modulus of the sample with its error.
     ///
     /// # Errors
-    /// [`ElasticityError`] where the loads do not determine it.
+    /// [`ElasticityError`] if the loads do not determine the modulus.
     fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError>;
 
-    /// Which estimator this is.
+    /// The kind of the estimator.
     ///
     /// ```
     /// use tactile_elasticity::modulus::{EstimatorKind, ModulusEstimator, PaperRatio};
@@ -47,8 +47,8 @@ pub trait ModulusEstimator: Send + Sync {
     /// ```
     fn kind(&self) -> EstimatorKind;
 
-    /// Whether it uses the loads' strains. Without them a caller can leave out surfaces, matches
-    /// and warps.
+    /// Whether the estimator uses the strains of the loads. If not, a caller can skip surfaces,
+    /// matches and warps.
     ///
     /// ```
     /// use tactile_elasticity::modulus::{HertzSphere, ModulusEstimator, PaperRatio};
@@ -64,9 +64,10 @@ pub trait ModulusEstimator: Send + Sync {
         true
     }
 
-    /// Whether the answer counts the guide of the series' [bodies](LoadSeries::bodies). A pipeline
-    /// adds the caution [`Warning::GuideIgnored`] to an answer from contacts alone that does not.
-    /// An estimator of one's own that takes the guide from the series returns true.
+    /// Whether the result takes the guide of the series' [bodies](LoadSeries::bodies) into account.
+    /// If a result from contacts alone does not, a pipeline adds the caution
+    /// [`Warning::GuideIgnored`]. A user-defined estimator that uses the guide of the series
+    /// returns `true`.
     ///
     /// ```
     /// use tactile_elasticity::contact::Body;
@@ -82,7 +83,7 @@ pub trait ModulusEstimator: Send + Sync {
     }
 }
 
-/// Boxed, shared and borrowed estimators.
+/// Implements the trait for boxed, shared and borrowed estimators.
 impl<P: Deref<Target: ModulusEstimator> + Send + Sync> ModulusEstimator for P {
     fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         (**self).estimate(series)
@@ -115,7 +116,7 @@ impl<P: Deref<Target: ModulusEstimator> + Send + Sync> ModulusEstimator for P {
 /// let modulus: ModulusEstimate =
 ///     HertzSphere::new(3e-3, 0.5)?.estimate(&LoadSeries::new([load]))?;
 /// assert!(modulus.interval_95.contains(30e3));
-/// // The number stands, with the warning that a/R = 0.47 is much.
+/// // The value is valid, with the warning that a/R = 0.47 is large.
 /// assert!(
 ///     matches!(modulus.warnings[0], Warning::LargeContact { load: 0, ratio, .. } if ratio > 0.4)
 /// );
@@ -127,26 +128,27 @@ impl<P: Deref<Target: ModulusEstimator> + Send + Sync> ModulusEstimator for P {
 pub struct ModulusEstimate {
     /// E of the sample.
     pub youngs_modulus_pa: f64,
-    /// Its standard error, to first order.
+    /// Standard error, to first order.
     pub standard_error_pa: f64,
-    /// The same E with its error by source.
+    /// The same modulus with its error by source.
     pub by_source: Uncertain,
-    /// 95 % confidence interval, not symmetric where E depends on the data non-linearly.
+    /// 95 % confidence interval. It is asymmetric if E depends non-linearly on the data.
     pub interval_95: Interval,
-    /// Which estimator.
+    /// The estimator.
     pub estimator: EstimatorKind,
-    /// Per load, in the order given.
+    /// Diagnostics per load, in the order given.
     pub loads: Vec<LoadDiagnostics>,
-    /// How the data agree with the law.
+    /// Agreement of the data with the law.
     pub fit: FitStatistics,
-    /// Where the estimator's assumptions fail.
+    /// Violated assumptions of the estimator.
     pub warnings: Vec<Warning>,
 }
 
 impl ModulusEstimate {
-    /// Of an estimator of one's own: E in pascals, an [`Estimate`](tactile_core::Estimate) or a
-    /// number with its error by source. The interval is symmetric, by Student's t where the error
-    /// has degrees of freedom. No lower end is below zero.
+    /// Creates the result of a user-defined estimator: E in pascals, as an
+    /// [`Estimate`](tactile_core::Estimate) or as a number with its error by source. The interval
+    /// is symmetric, by Student's t if the error has degrees of freedom, and its lower end is not
+    /// negative.
     ///
     /// ```
     /// use tactile_elasticity::modulus::{Estimate, EstimatorKind, ModulusEstimate};
@@ -173,7 +175,7 @@ impl ModulusEstimate {
     }
 }
 
-/// What one load contributed.
+/// Contribution of one load.
 ///
 /// ```
 /// use tactile_elasticity::contact::HertzContact;
@@ -181,7 +183,7 @@ impl ModulusEstimate {
 ///     Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator,
 /// };
 ///
-/// // The second load carries nothing but its force.
+/// // The second load has only a force.
 /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
 /// let force = LoadState::new(Estimate::new(1e-3, 1e-5));
 /// let loads = [
@@ -196,17 +198,17 @@ impl ModulusEstimate {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct LoadDiagnostics {
-    /// True when the load carried what the estimator needs.
+    /// Whether the load has the quantities that the estimator needs.
     pub used: bool,
-    /// a/R, measured, or by the law from what was measured.
+    /// a/R, measured or derived by the law.
     pub contact_ratio: Option<f64>,
-    /// The modulus this load alone would give.
+    /// The modulus from this load alone.
     pub youngs_modulus_pa: Option<f64>,
     /// Residual over its standard deviation.
     pub standardized_residual: Option<f64>,
 }
 
-/// How a law fits the data.
+/// Agreement of the data with a law.
 ///
 /// ```
 /// use tactile_elasticity::contact::HertzContact;
@@ -237,12 +239,12 @@ pub struct FitStatistics {
     pub observations: usize,
     /// Number of fitted parameters.
     pub parameters: usize,
-    /// Σ (residual/σ)², or the residuals' own sum where no σ was given.
+    /// Σ (residual/σ)², or the sum of squared residuals if no σ was given.
     pub chi_squared: f64,
 }
 
 impl FitStatistics {
-    /// From the numbers of observations and parameters, and χ².
+    /// Computes the statistics from the numbers of observations and parameters, and χ².
     pub(crate) fn new(observations: usize, parameters: usize, chi_squared: f64) -> Self {
         Self {
             observations,

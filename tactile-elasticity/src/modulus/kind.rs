@@ -18,16 +18,16 @@ pub enum EstimatorKind {
     SphereOnWaveguide,
     /// A soft ball on a rigid flat, at finite strain.
     SphereOnFlat,
-    /// A soft ball on what its table of contacts was made for.
+    /// A soft ball on the guide of a contact table.
     TabulatedContact,
     FlatPunch,
     Cone,
     LayerIntegralEquation,
     FreeLayerIntegralEquation,
-    /// A law with a guide where there is one, as on a rigid flat: what it gives is not what the law
-    /// of that name gives.
+    /// A law that ignores an existing guide, as if it were rigid. Its result differs from that of
+    /// the law with this name.
     GuideIgnored,
-    /// An estimator from outside this crate, by its name.
+    /// An estimator from outside this crate, with its name.
     Other(&'static str),
 }
 

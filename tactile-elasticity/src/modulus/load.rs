@@ -1,11 +1,11 @@
-//! What was measured at one load.
+//! Measurements at one load.
 
 use super::bodies::Bodies;
 use crate::error::{ElasticityError, Quantity};
 use std::sync::Arc;
 use tactile_core::Uncertain;
 
-/// The number, if it is finite, with an error and degrees of freedom that can be.
+/// Returns the number if it is finite and its error and degrees of freedom are valid.
 pub(crate) fn validated(
     number: Uncertain,
     quantity: Quantity,
@@ -20,14 +20,14 @@ pub(crate) fn validated(
     Ok(number)
 }
 
-/// One load: the force and what was measured of the contact.
+/// One load: the force and the measured properties of the contact.
 ///
-/// Pressing forces are positive. Strain is that between the unloaded state (or the first load, see
-/// the estimators) and this load, positive where the object is squeezed.
+/// Pressing forces are positive. Strain is counted from the unloaded state (or from the first load,
+/// see the estimators) to this load, and is positive in compression.
 ///
-/// Every number has its error by [`Source`](tactile_core::Source). One source is one error in all loads, which averaging
-/// does not reduce, and noise another one in each. The error of an [`Estimate`](tactile_core::Estimate)
-/// counts as noise.
+/// Each number has its error by [`Source`](tactile_core::Source). An error source has the same
+/// error in all loads, which averaging does not reduce; noise is independent between loads. The
+/// error of an [`Estimate`](tactile_core::Estimate) counts as noise.
 ///
 /// ```
 /// use tactile_elasticity::modulus::{
@@ -50,20 +50,20 @@ pub(crate) fn validated(
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LoadState {
-    /// F.
+    /// Force F.
     pub force_n: Uncertain,
-    /// a, of a round contact.
+    /// Radius a of a round contact.
     pub contact_radius_m: Option<Uncertain>,
-    /// The contact's area, where it is not πa².
+    /// Area of the contact, if it is not πa².
     pub contact_area_m2: Option<Uncertain>,
-    /// δ, the approach of the two bodies.
+    /// Indentation δ, the approach of the two bodies.
     pub indentation_m: Option<Uncertain>,
-    /// Mean e_zz, positive where the object is squeezed.
+    /// Mean e_zz, positive in compression.
     pub mean_strain: Option<Uncertain>,
 }
 
 impl LoadState {
-    /// A load of which only the force is known yet.
+    /// A load with only a force.
     pub fn new(force_n: impl Into<Uncertain>) -> Self {
         Self {
             force_n: force_n.into(),
@@ -71,35 +71,35 @@ impl LoadState {
         }
     }
 
-    /// With the radius of its contact.
+    /// Sets the radius of the contact.
     #[must_use]
     pub fn with_radius(mut self, contact_radius_m: impl Into<Uncertain>) -> Self {
         self.contact_radius_m = Some(contact_radius_m.into());
         self
     }
 
-    /// With the area of its contact.
+    /// Sets the area of the contact.
     #[must_use]
     pub fn with_area(mut self, contact_area_m2: impl Into<Uncertain>) -> Self {
         self.contact_area_m2 = Some(contact_area_m2.into());
         self
     }
 
-    /// With its indentation.
+    /// Sets the indentation.
     #[must_use]
     pub fn with_indentation(mut self, indentation_m: impl Into<Uncertain>) -> Self {
         self.indentation_m = Some(indentation_m.into());
         self
     }
 
-    /// With its mean strain.
+    /// Sets the mean strain.
     #[must_use]
     pub fn with_strain(mut self, mean_strain: impl Into<Uncertain>) -> Self {
         self.mean_strain = Some(mean_strain.into());
         self
     }
 
-    /// F over the area given, or over πa². `None` if neither is known or the area is zero.
+    /// F over the stated area, or over πa². `None` if neither is known or the area is zero.
     ///
     /// ```
     /// use tactile_elasticity::modulus::{Estimate, LoadState};
@@ -112,7 +112,7 @@ impl LoadState {
         (area > 0.0).then(|| self.force_n.value / area)
     }
 
-    /// The area given, or πa².
+    /// The stated area, or πa².
     pub(crate) fn area(&self) -> Option<Uncertain> {
         let disc = |a: Uncertain| a.powf(2.0) * std::f64::consts::PI;
         self.contact_area_m2
@@ -141,7 +141,7 @@ pub struct LoadSeries {
 }
 
 impl LoadSeries {
-    /// A vector, an array or a slice of loads.
+    /// Creates a series from a vector, an array or a slice of loads.
     pub fn new(loads: impl Into<Vec<LoadState>>) -> Self {
         Self {
             loads: loads.into(),
@@ -149,14 +149,14 @@ impl LoadSeries {
         }
     }
 
-    /// With the sample and the guide it is pressed on. A pipeline's series has them.
+    /// Adds the sample and the guide that it is pressed against. The series of a pipeline has both.
     #[must_use]
     pub fn with_bodies(mut self, bodies: impl Into<Arc<Bodies>>) -> Self {
         self.bodies = Some(bodies.into());
         self
     }
 
-    /// The sample and the guide it is pressed on. `None` if they were not given.
+    /// The sample and the guide that it is pressed against. `None` if they were not stated.
     ///
     /// ```
     /// use tactile_elasticity::modulus::{Bodies, Estimate, LoadSeries, LoadState, Object};

@@ -1,4 +1,4 @@
-//! Young's modulus from what was measured at one or more loads.
+//! Young's modulus from measurements at one or more loads.
 
 mod bodies;
 mod contact;

@@ -9,10 +9,10 @@ use crate::error::{ElasticityError, Quantity};
 use tactile_core::statistics::quantile_95;
 use tactile_core::{Interval, Source, Uncertain};
 
-/// Strain beyond which one modulus no longer describes a rubber.
+/// Strain above which a single modulus no longer describes a rubber.
 pub(crate) const LINEAR_STRAIN: f64 = 0.1;
 
-/// What the strain of a load is counted from.
+/// Origin of the strain of a load.
 ///
 /// ```
 /// use tactile_elasticity::modulus::{
@@ -36,18 +36,18 @@ pub enum StrainReference {
     /// The unloaded object: stress is counted from zero.
     #[default]
     Unloaded,
-    /// The first load, as when two pressed frames are matched: stress is counted from there, and
-    /// its own strain, where it has one, is taken from all others.
+    /// The first load, for example if two pressed frames are matched: stress is counted from there.
+    /// If the first load has a strain, it is subtracted from all others.
     FirstLoad,
 }
 
-/// E = S_zz / ⟨e_zz⟩, equation (31): right where the loading is uniaxial.
+/// E = S_zz / ⟨e_zz⟩, equation (31): correct under uniaxial load.
 ///
-/// On a sphere it is biased by construction. Hertz's pressure p₀√(1 − r²/a²), read as the shading
-/// of a surface, is a hemisphere of radius a ∝ (FR/E*)^⅓, whose apparent strain between two loads,
-/// ½((F₂/F₁)^⅔ − 1), does not depend on E at all. The modulus enters through the mean pressure
-/// F/(πa²) ∝ (E*/R)^⅔ F^⅓ alone. Give the sphere's radius to be told so, and use
-/// [`HertzSphere`](super::HertzSphere) for a number.
+/// On a sphere it is biased by construction. Hertz's pressure p₀√(1 − r²/a²), interpreted as the
+/// shading of a surface, is a hemisphere of radius a ∝ (FR/E*)^⅓. Its apparent strain between two
+/// loads, ½((F₂/F₁)^⅔ − 1), does not depend on E at all. The modulus enters only through the mean
+/// pressure F/(πa²) ∝ (E*/R)^⅔ F^⅓. State the radius of the sphere to get a warning, and use
+/// [`HertzSphere`](super::HertzSphere) for the modulus.
 ///
 /// Several loads are averaged with the weights of their relative errors.
 ///
@@ -64,7 +64,7 @@ pub enum StrainReference {
 /// let plain = PaperRatio::default().estimate(&series)?;
 /// assert!((plain.youngs_modulus_pa - 60e3_f64).abs() < 1e-6);
 ///
-/// // On a sphere the ratio is biased, which is a warning.
+/// // On a sphere the ratio is biased, which gives a warning.
 /// let on_sphere = PaperRatio::default().with_sphere_radius(3e-3)?.estimate(&series)?;
 /// let biased = |w: &Warning| matches!(w, Warning::RatioOnSphere { .. });
 /// assert!(on_sphere.warnings.iter().any(biased));
@@ -77,14 +77,14 @@ pub struct PaperRatio {
 }
 
 impl PaperRatio {
-    /// With strain counted from `reference`. By default from the unloaded state.
+    /// Sets the origin of strain. The default is the unloaded state.
     pub fn with_reference(mut self, reference: StrainReference) -> Self {
         self.reference = reference;
         self
     }
 
-    /// The object is a sphere of this radius (m): the bias is warned of, with a/R.
-    ///
+    /// States that the object is a sphere of this radius (m), so that results carry a warning about
+    /// the bias, with a/R.
     /// # Errors
     /// [`ElasticityError::NotPositive`].
     pub fn with_sphere_radius(mut self, radius_m: f64) -> Result<Self, ElasticityError> {
@@ -98,14 +98,14 @@ impl PaperRatio {
         let (mut first_stress, mut first_strain) = (Uncertain::exact(0.0), Uncertain::exact(0.0));
         if let (true, Some(first)) = (from_first, loads.first()) {
             first_stress = stress(0, first)?;
-            // Its own strain, where strains are counted from an earlier state.
+            // The strain of the first load, if strains are counted from an earlier state.
             first_strain = first.mean_strain.unwrap_or(first_strain);
         }
         for (load, state) in loads.iter().enumerate().skip(usize::from(from_first)) {
             let Some(strain) = state.mean_strain else {
                 continue;
             };
-            // The noise of the first load is one in all ratios.
+            // The noise of the first load is common to all ratios.
             let own = |number: Uncertain| number.without(Source::Noise);
             let strain = validated(strain, Quantity::Strain)? - own(first_strain);
             let stress = stress(load, state)? - own(first_stress);
@@ -186,13 +186,13 @@ impl PaperRatio {
 
 struct Ratio {
     load: usize,
-    /// ln E, but for the noise of the first load.
+    /// ln E, without the noise of the first load.
     log_modulus: Uncertain,
     stress_pa: f64,
     strain: f64,
 }
 
-/// Ratios, and what they are counted from.
+/// Ratios with their origin.
 struct Ratios {
     ratios: Vec<Ratio>,
     first_stress: Uncertain,
@@ -269,7 +269,7 @@ impl ModulusEstimator for PaperRatio {
     }
 }
 
-/// Loads whose strain is beyond the linear law.
+/// Warnings for loads whose strain is outside the range of the linear law.
 pub(crate) fn strain_warnings(loads: &[LoadState]) -> Vec<Warning> {
     (loads.iter().enumerate())
         .filter_map(|(load, state)| state.mean_strain.map(|e| (load, e.value)))

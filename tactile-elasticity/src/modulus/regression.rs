@@ -12,9 +12,9 @@ use tactile_core::{Interval, Source, Uncertain};
 
 /// S_i = S₀ + E e_i over many loads, with errors in both.
 ///
-/// Each load weighs 1/(σ_S² + E²σ_e²) (York's effective variance without correlation). Without any
-/// standard errors all weigh the same and the error is estimated from the scatter. At least two
-/// loads, three where neither errors nor a zero intercept are given.
+/// Each load has the weight 1/(σ_S² + E²σ_e²) (York's effective variance without correlation).
+/// Without standard errors all weights are equal, and the error is estimated from the scatter. It
+/// needs at least two loads, or three if neither errors nor a zero intercept are given.
 ///
 /// ```
 /// use tactile_elasticity::modulus::{
@@ -36,15 +36,15 @@ pub struct StressStrainRegression {
 }
 
 impl StressStrainRegression {
-    /// The line goes through the origin. By default it has an intercept, which is tested: a
-    /// significant one is warned of.
+    /// Forces the line through the origin. By default it has an intercept, and a significant
+    /// intercept gives a warning.
     ///
     /// ```
     /// use tactile_elasticity::modulus::{
     ///     Estimate, LoadSeries, LoadState, ModulusEstimator, StressStrainRegression, Warning,
     /// };
     ///
-    /// // Stress that starts at 300 Pa: a gauge that was not tared.
+    /// // Stress that starts at 300 Pa, from a gauge that was not tared.
     /// let loads = [0.01, 0.02, 0.03, 0.04].map(|strain: f64| LoadState::new(Estimate::new((300.0 + 60e3 * strain) * 1e-4, 1e-4))
     ///     .with_area(Estimate::exact(1e-4))
     ///     .with_strain(Estimate::exact(strain)));
@@ -79,7 +79,7 @@ impl StressStrainRegression {
         Ok(points)
     }
 
-    /// The line with a slope above zero.
+    /// The line, whose slope must be positive.
     pub(super) fn line(&self, points: &[Point]) -> Result<Line, ElasticityError> {
         let known = Self::known(points);
         self.check(points, known)?;
@@ -129,9 +129,9 @@ impl StressStrainRegression {
         Ok(())
     }
 
-    /// The slope with its error by source. What sources beside noise do to stresses and strains
-    /// moves the slope as they move the points: S by dS and e by de move it by
-    /// Σ w (e − ē)(dS − E de)/Σ w (e − ē)².
+    /// The slope with its error by source. Errors of stresses and strains from sources other than
+    /// noise change the slope as shifts of the points do: shifts dS of S and de of e change it by Σ
+    /// w (e − ē)(dS − E de)/Σ w (e − ē)².
     fn by_source(points: &[Point], line: &Line) -> Uncertain {
         let noise = |of: fn(&Point) -> &Uncertain, scale: f64| {
             let variance = points
@@ -183,7 +183,7 @@ impl StressStrainRegression {
     }
 }
 
-/// Residuals over their standard errors. Over the scatter where no errors are known.
+/// Residuals over their standard errors, or over the scatter if the errors are unknown.
 fn diagnostics(points: &[Point], line: &Line, known: bool, loads: usize) -> Vec<LoadDiagnostics> {
     let mut diagnostics = vec![LoadDiagnostics::default(); loads];
     for p in points {
@@ -236,7 +236,7 @@ pub(super) struct Line {
     degrees: usize,
     learnt: bool,
     excess: Option<f64>,
-    /// What a change of each stress does to the slope.
+    /// Change of the slope per unit change of each stress.
     weights: Vec<f64>,
 }
 
@@ -247,7 +247,7 @@ pub(super) struct Point {
 }
 
 impl Point {
-    /// Standard deviation of the stress from the line by noise.
+    /// Standard deviation of the stress from the line because of noise.
     fn spread(&self, slope: f64) -> f64 {
         noise(&self.stress).hypot(slope * noise(&self.strain))
     }
@@ -258,8 +258,9 @@ fn noise(number: &Uncertain) -> f64 {
 }
 
 impl Line {
-    /// The line through the points, or through them and the origin. Weighted by their errors where
-    /// these are known. The weights depend on the slope, so that the fit is iterated.
+    /// The line through the points, or through the points and the origin. It is weighted by the
+    /// errors of the points if they are known. The weights depend on the slope, so the fit is
+    /// iterated.
     fn fit(points: &[Point], free: bool, known: bool) -> Self {
         let mut line = Self::weighted(points, |_| 1.0, free, false);
         if !known {
@@ -277,7 +278,7 @@ impl Line {
         line
     }
 
-    /// Weighted least squares about the weighted centre, which keeps the two parameters apart.
+    /// Weighted least squares about the weighted centre, which decorrelates the two parameters.
     fn weighted(points: &[Point], weight: impl Fn(&Point) -> f64, free: bool, known: bool) -> Self {
         let sum = |f: &dyn Fn(&Point) -> f64| points.iter().map(|p| weight(p) * f(p)).sum::<f64>();
         let total = sum(&|_| 1.0);

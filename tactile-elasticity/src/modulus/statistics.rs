@@ -1,4 +1,4 @@
-//! Quantiles, and the generalised least squares mean.
+//! Quantiles, and the generalised least-squares mean.
 
 use super::estimate::FitStatistics;
 use super::warning::Warning;
@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 use tactile_core::{Source, Uncertain};
 
-/// The smallest of the degrees of freedom that are not infinite.
+/// The smallest of the finite degrees of freedom.
 pub(crate) fn fewest(degrees: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     degrees.flatten().reduce(f64::min)
 }
@@ -25,14 +25,14 @@ pub(crate) fn t_tail(x: f64, degrees: usize) -> f64 {
 /// The best common mean of correlated numbers.
 #[derive(Debug, Clone)]
 pub(crate) struct CommonMean {
-    /// The mean, its error by source, scaled up where the scatter exceeds the errors. All of it is
-    /// noise, with the scatter's degrees of freedom, where no error was given.
+    /// The mean with its error by source, scaled up if the scatter exceeds the errors. If no errors
+    /// were given, all of it is noise, with the degrees of freedom of the scatter.
     pub(crate) mean: Uncertain,
     chi_squared: f64,
-    /// χ²/ν where it was used to scale the error up.
+    /// χ²/ν, if the error was scaled up by it.
     excess: Option<f64>,
     pub(crate) standardized_residuals: Vec<f64>,
-    /// Of every number in the mean. Their sum is one.
+    /// Weight of each number in the mean. The weights sum to one.
     pub(crate) weights: DVector<f64>,
 }
 
@@ -43,13 +43,13 @@ impl CommonMean {
         FitStatistics::new(observations, 1, self.chi_squared)
     }
 
-    /// Whether its error is known, or was learnt from the scatter.
+    /// Whether the error is known or was estimated from the scatter.
     pub(crate) fn has_error(&self) -> bool {
         self.mean.standard_error().is_finite()
     }
 
-    /// Cautions that follow from the scatter and the errors. `bounded` is whether the interval has
-    /// an upper end.
+    /// Cautions that follow from scatter and errors. `bounded` states whether the interval has an
+    /// upper end.
     pub(crate) fn warnings(&self, bounded: bool) -> Vec<Warning> {
         let excess = self.excess;
         let mut warnings: Vec<_> = excess
@@ -67,16 +67,17 @@ impl CommonMean {
     }
 }
 
-// The errors are scaled up to the scatter when χ² is this improbable.
+// The errors are scaled up to the scatter if the probability of χ² is below this.
 const EXCESS_PROBABILITY: f64 = 1e-3;
 
-/// θ = (1ᵀΣ⁻¹z)/(1ᵀΣ⁻¹1). Σ = 0 means unknown: equal weights and the error from the scatter.
+/// θ = (1ᵀΣ⁻¹z)/(1ᵀΣ⁻¹1). Σ = 0 means unknown errors: weights are equal, and the error comes from
+/// the scatter.
 ///
-/// Errors that all numbers share enter as unknowns s of a standard normal prior, z = θ + U s + ε,
-/// so that only the errors of single loads are factorised. With these whitened and U split into its
-/// weighted mean ū and the rest Ũ, ŝ = (1 + ŨᵀŨ)⁻¹Ũᵀz, θ = z̄ − ū·ŝ and var θ = 1/Σw + ūᵀ(1 +
-/// ŨᵀŨ)⁻¹ū: the Woodbury identity, written so that nothing cancels where a shared error is much
-/// larger than the others. O(n k²) with k shared errors.
+/// Errors common to all numbers enter as unknowns s with a standard normal prior, z = θ + U s + ε,
+/// so that only the errors of single loads are factorised. After whitening with these, U is split
+/// into its weighted mean ū and the rest Ũ. Then ŝ = (1 + ŨᵀŨ)⁻¹Ũᵀz, θ = z̄ − ū·ŝ and var θ =
+/// 1/Σw + ūᵀ(1 + ŨᵀŨ)⁻¹ū. This is the Woodbury identity in a form without cancellation if a common
+/// error is much larger than the others. O(n k²) with k common errors.
 pub(crate) fn common_mean(
     z: &[f64],
     covariance: &Covariance,
@@ -136,8 +137,8 @@ pub(crate) fn common_mean(
     })
 }
 
-/// Residuals over their standard deviations, the variances times `unit`. Without a covariance all
-/// have one variance.
+/// Residuals over their standard deviations, with the variances multiplied by `unit`. Without a
+/// covariance all have the same variance.
 fn standardized(z: &[f64], mean: f64, covariance: Option<&Covariance>, unit: f64) -> Vec<f64> {
     let over_spread = |(i, z): (usize, &f64)| {
         let spread = (covariance.map_or(1.0, |c| c.variance(i)) * unit).sqrt();
@@ -150,10 +151,10 @@ fn standardized(z: &[f64], mean: f64, covariance: Option<&Covariance>, unit: f64
     z.iter().enumerate().map(over_spread).collect()
 }
 
-/// Which numbers one error is common to.
+/// The numbers that share an error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum CommonTo {
-    /// Every number has another one.
+    /// Each number has an independent error.
     None,
     /// The numbers of one load.
     Load,
@@ -161,7 +162,7 @@ pub(crate) enum CommonTo {
     All,
 }
 
-/// What one standard deviation of an error does to every number.
+/// Effect of one standard deviation of an error on each number.
 #[derive(Debug, Clone)]
 struct ErrorOf {
     source: Source,
@@ -172,20 +173,20 @@ struct ErrorOf {
 
 /// The covariance Σ = diag(v) + Σ_load s sᵀ + U Uᵀ of n numbers.
 ///
-/// v are variances of errors that each number has for itself, s standard errors that the numbers of
-/// one load have in common, the columns of U those that all have in common. Products and solutions
-/// take O(n k²) time and O(n k) memory with k columns.
+/// v are variances of independent errors, s standard errors common to the numbers of one load, and
+/// the columns of U errors common to all. With k columns, products and solutions take O(n k²) time
+/// and O(n k) memory.
 #[derive(Debug, Clone)]
 pub(crate) struct Covariance {
-    /// The load that each number belongs to. Numbers of one load, at most two (its radius and its
-    /// indentation), are neighbours.
+    /// The load of each number. Numbers of one load, at most two (its radius and its indentation),
+    /// are adjacent.
     loads: Vec<usize>,
     errors: Vec<ErrorOf>,
 }
 
 impl Covariance {
-    /// Of numbers, each with the load it belongs to. A source is one error of all numbers, noise is
-    /// another one in each.
+    /// The covariance of numbers, each with its load. An error source is common to all numbers;
+    /// noise is independent.
     pub(crate) fn of(numbers: &[Uncertain], loads: impl Iterator<Item = usize>) -> Self {
         let none = Self {
             loads: loads.collect(),
@@ -204,7 +205,7 @@ impl Covariance {
         })
     }
 
-    /// With another error beside these: what one standard deviation of it does to each number.
+    /// Adds another error, given by the effect of one standard deviation on each number.
     pub(crate) fn with(
         mut self,
         source: Source,
@@ -224,9 +225,9 @@ impl Covariance {
         self
     }
 
-    /// With errors of a law or a table that err the same way at all loads as far as the smallest
-    /// goes. What they err beyond that at the others is not known to be in proportion: counted as
-    /// common, the weighted mean would extrapolate it away.
+    /// Adds errors of a law or a table. The smallest of them is common to all loads. The excess at
+    /// other loads is not known to be proportional: if it were treated as common, the weighted mean
+    /// would extrapolate it away.
     pub(crate) fn with_model_errors(
         self,
         source: Source,
@@ -256,8 +257,9 @@ impl Covariance {
         self.effects(CommonTo::All)
     }
 
-    /// A weighted mean with this standard error, its parts in the proportion that the errors have
-    /// in it. `learnt` are the degrees of freedom of an error that was scaled up to the scatter.
+    /// A weighted mean with this standard error. Its parts by source are in proportion to their
+    /// contributions. `learnt` are the degrees of freedom of an error that was scaled up to the
+    /// scatter.
     fn of_mean(
         &self,
         value: f64,
@@ -271,13 +273,13 @@ impl Covariance {
             mean = mean.by_estimated(error.source, self.effect_on(weights, error), degrees);
         }
         match mean.standard_error() {
-            // Rounding alone is left of errors that cancel.
+            // The errors cancel to rounding.
             0.0 => mean.by(Source::Noise, standard_error),
             total => mean.map(|value| value, |_| standard_error / total),
         }
     }
 
-    /// What one standard deviation of an error does to a weighted sum.
+    /// Effect of one standard deviation of an error on a weighted sum.
     fn effect_on(&self, weights: &DVector<f64>, error: &ErrorOf) -> f64 {
         let each = error.effects.component_mul(weights);
         match error.common_to {
@@ -308,21 +310,22 @@ impl Covariance {
         unshared.map(|error| error.effects[i].powi(2)).sum()
     }
 
-    /// Whether any error is above zero.
+    /// Whether any error is positive.
     fn is_known(&self) -> bool {
         (0..self.len()).any(|i| self.variance(i) > 0.0)
     }
 
-    /// Of number i and its neighbour before: (Σ − U Uᵀ)ᵢ,ᵢ₋₁. `None` if that is another load's.
+    /// Covariance of number i and the one before, (Σ − U Uᵀ)ᵢ,ᵢ₋₁. `None` if that number belongs to
+    /// another load.
     fn within_load(&self, i: usize) -> Option<f64> {
         let before = i.checked_sub(1)?;
         let products = self.effects(CommonTo::Load).map(|u| u[i] * u[before]);
         (self.loads[i] == self.loads[before]).then(|| products.sum())
     }
 
-    /// The factor L of Σ − U Uᵀ = L Lᵀ. What is perfectly correlated or without error gets a ridge
-    /// of 10⁻¹² of the mean variance (of Σ's, where all errors are shared): the answer then depends
-    /// on it in the twelfth digit, and rounding (10⁻¹⁶) is still far below it.
+    /// The factor L of Σ − U Uᵀ = L Lᵀ. Perfectly correlated or exact numbers get a ridge of 10⁻¹²
+    /// of the mean variance (of Σ's, if all errors are common). The result then depends on the
+    /// ridge in the twelfth digit, and rounding (10⁻¹⁶) is still far below it.
     fn unshared_factor(&self) -> Result<Factor, ElasticityError> {
         let n = self.len();
         let mean_of =
@@ -368,15 +371,15 @@ impl Covariance {
     }
 }
 
-/// A lower triangular matrix L of blocks on the diagonal, of one or two numbers each.
+/// A lower block-triangular matrix L with blocks of one or two numbers on the diagonal.
 struct Factor {
     diagonal: Vec<f64>,
-    /// Lᵢ,ᵢ₋₁, zero at the first number of a block.
+    /// Lᵢ,ᵢ₋₁, or zero at the first number of a block.
     below: Vec<f64>,
 }
 
 impl Factor {
-    /// The identity for n numbers, of which nothing is known.
+    /// The identity for n numbers with unknown errors.
     fn identity(n: usize) -> Self {
         Self {
             diagonal: vec![1.0; n],
@@ -384,7 +387,7 @@ impl Factor {
         }
     }
 
-    /// L⁻¹v: numbers whose errors are independent and one.
+    /// L⁻¹v: numbers with independent errors of size one.
     fn whiten(&self, mut v: DVector<f64>) -> DVector<f64> {
         let mut before = 0.0;
         for (i, v) in v.iter_mut().enumerate() {
@@ -394,7 +397,7 @@ impl Factor {
         v
     }
 
-    /// L⁻ᵀv: weights of the numbers from those of the whitened ones.
+    /// L⁻ᵀv: weights of the numbers from those of the whitened numbers.
     fn weights(&self, mut v: DVector<f64>) -> DVector<f64> {
         let mut carried = 0.0;
         for (i, v) in v.iter_mut().enumerate().rev() {

@@ -2,8 +2,8 @@ use super::*;
 
 use approx::assert_relative_eq;
 
-/// The mean, its variance, χ² and the weights against the plain formulas with the matrix of all
-/// pairs.
+/// Compares the mean, its variance, χ² and the weights with the plain formulas for the full
+/// covariance matrix.
 #[test]
 fn shared_errors_give_what_the_matrix_of_all_pairs_gives() {
     let z = [2.0, 2.3, 1.8, 2.1, 2.6, 1.9];
@@ -41,7 +41,7 @@ fn shared_errors_give_what_the_matrix_of_all_pairs_gives() {
     let residual = DVector::from_row_slice(&z).add_scalar(-mean);
     let chi_squared = residual.dot(&(&inverse * &residual));
 
-    // Inverting a matrix of this condition (10²) costs three of sixteen digits.
+    // Inverting a matrix with this condition number (10²) costs three of sixteen digits.
     let found = common_mean(&z, &covariance).unwrap();
     assert_relative_eq!(found.mean.value, mean, max_relative = 1e-12);
     assert_relative_eq!(
@@ -69,6 +69,6 @@ fn a_shared_error_far_above_all_others_costs_no_digits() {
     assert_relative_eq!(found.mean.value, 1.0, max_relative = 1e-15);
     assert_relative_eq!(found.mean.standard_error(), 1.0, max_relative = 1e-12);
     // Two residuals of one standard error each. z itself is rounded to 1e-16, a ten-millionth of
-    // them.
+    // the residuals.
     assert_relative_eq!(found.chi_squared, 2.0, max_relative = 1e-6);
 }

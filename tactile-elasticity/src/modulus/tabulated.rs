@@ -11,13 +11,14 @@ use crate::error::{ElasticityError, Quantity};
 use std::sync::Arc;
 use tactile_core::{Interval, Source, Uncertain, statistics::quantile_95};
 
-/// A soft ball on the guide, or the rigid flat, of a [`ContactTable`]: the E at which the tabulated
-/// forces at the measured contact radii fit the measured forces best, all loads at once.
+/// A soft ball on the guide, or the rigid flat, of a [`ContactTable`]. The modulus E is fitted so
+/// that the tabulated forces at the measured contact radii agree best with the measured forces, for
+/// all loads together.
 ///
 /// ln F(aᵢ, E) = ln Fᵢ is solved for ln E by generalised least squares (Gauss–Newton), with the
-/// covariance of forces and radii, the errors that all loads share, and the table's own error. The
-/// interval is carried through the table, and is open above where it leaves it. Loads outside the
-/// table are not used, with a warning. O(n) in the loads, some microseconds for two.
+/// covariance of forces and radii, the errors common to all loads, and the error of the table. The
+/// interval follows the table, and has no upper end if it leaves the table. Loads outside the table
+/// are skipped with a warning. O(n) in the loads; two loads take several microseconds.
 ///
 /// ```
 /// use tactile_elasticity::contact::{ContactCurve, ContactTable, Waveguide};
@@ -43,7 +44,7 @@ use tactile_core::{Interval, Source, Uncertain, statistics::quantile_95};
 ///     .estimate(&LoadSeries::new([load]))?;
 /// let relative_error: f64 = estimate.youngs_modulus_pa / 67.5e3 - 1.0;
 /// assert!(relative_error.abs() < 1e-9);
-/// // Another ball than the table's.
+/// // A ball other than that of the table.
 /// assert!(TabulatedContact::new(table, 4e-3, 0.5, &flat).is_err());
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -52,16 +53,16 @@ pub struct TabulatedContact {
     table: Arc<ContactTable>,
 }
 
-// Standard error of ln F that finite elements leave beside the interpolation's: meshes of twice
-// the elements move F by this (`a_finer_mesh_moves_the_table_little`).
+// Standard error of ln F from the finite elements, in addition to that of the interpolation: meshes
+// with twice as many elements change F by this (`a_finer_mesh_moves_the_table_little`).
 const ELEMENT_ERROR: f64 = 3e-3;
 
-// Part of ln F below which a change of ln E changes nothing: the ball is rigid beside the guide.
+// Minimum sensitivity of ln F to ln E. Below it the ball is rigid compared with the guide.
 const LEAST_SENSITIVITY: f64 = 0.01;
 
 impl TabulatedContact {
-    /// For a ball of radius R (m) and Poisson ratio ν on a guide: those that the table was made
-    /// for.
+    /// Creates the estimator for a ball of radius R (m) and Poisson ratio ν on a guide, which must
+    /// be those of the table.
     ///
     /// # Errors
     /// [`ElasticityError::TableMismatch`] for any other ball or guide.
@@ -76,7 +77,7 @@ impl TabulatedContact {
         Ok(Self { table })
     }
 
-    /// The loads with a contact radius.
+    /// The loads that have a contact radius.
     fn contacts(&self, loads: &[LoadState]) -> Result<Vec<Contact>, ElasticityError> {
         let mut contacts = Vec::with_capacity(loads.len());
         for (load, state) in loads.iter().enumerate() {
@@ -96,7 +97,7 @@ impl TabulatedContact {
         Ok(contacts)
     }
 
-    /// The fit to the loads that the table covers at the modulus it finds.
+    /// The fit to the loads that the table covers at the resulting modulus.
     fn fit_covered(
         &self,
         mut contacts: Vec<Contact>,
@@ -125,7 +126,7 @@ impl TabulatedContact {
         }
     }
 
-    /// ln E at which the tabulated forces fit best, started in the table's middle.
+    /// ln E at which the tabulated forces fit best, starting in the middle of the table.
     fn fit(&self, contacts: &[Contact], series: &LoadSeries) -> Result<Fit, ElasticityError> {
         let [lowest, highest] = self.table.log_moduli();
         let mut log_modulus = if lowest.is_finite() {
@@ -133,8 +134,8 @@ impl TabulatedContact {
         } else {
             0.0
         };
-        // Newton's method in one unknown on a function that is nearly a straight line: three or
-        // four steps, ten where it bends.
+        // Newton's method in one unknown on a nearly straight function takes three or four steps,
+        // and ten if it bends.
         const STEPS: usize = 30;
         const SETTLED: f64 = 1e-11;
         for step in 0..STEPS {
@@ -142,7 +143,7 @@ impl TabulatedContact {
                 .map(|c| self.table.at(c.radius.value, log_modulus))
                 .collect();
             let covariance = self.covariance(contacts, &forces, series);
-            // The ln E that each load asks for, along its tangent.
+            // The ln E of each load, along its tangent.
             let own: Vec<f64> = (contacts.iter().zip(&forces))
                 .map(|(c, f)| log_modulus + (c.force.value.ln() - f.log_force) / sensitivity(f))
                 .collect();
@@ -168,7 +169,7 @@ impl TabulatedContact {
         unreachable!("the last step returns")
     }
 
-    /// The covariance of each load's ln E.
+    /// The covariance of the ln E of each load.
     fn covariance(
         &self,
         contacts: &[Contact],
@@ -188,8 +189,8 @@ impl TabulatedContact {
         };
         let ratio = bodies.map_or(Uncertain::exact(nu), Bodies::poisson_ratio);
         let lateral = ratio.map(|_| 0.0, |_| -2.0 * nu / (1.0 - nu * nu));
-        // F has the dimension E R²: what does not follow a follows R, what does not follow E
-        // follows the guide's moduli.
+        // F has the dimension E R². The exponent not taken by a belongs to R, and that not taken by
+        // E to the moduli of the guide.
         let log_modulus = |(c, f): (&Contact, &TabulatedForce)| {
             let of_force = log(c.force) - log(c.radius) * f.radius_slope;
             let of_bodies = compliance * (1.0 - f.modulus_slope) + lateral * f.modulus_slope
@@ -197,7 +198,7 @@ impl TabulatedContact {
             (of_force + of_bodies) * sensitivity(f).recip()
         };
         let numbers: Vec<_> = contacts.iter().zip(forces).map(log_modulus).collect();
-        // What an error of ln F does to ln E.
+        // Effect of an error of ln F on ln E.
         let over = |i: usize, of_log_force: f64| of_log_force / sensitivity(&forces[i]);
         let adhesion = |i: usize| bodies.map_or(0.0, |b| b.adhesion(contacts[i].force.value));
         let model = self.table.interpolation_error().hypot(ELEMENT_ERROR);
@@ -206,8 +207,8 @@ impl TabulatedContact {
             .with_model_errors(Source::Law, |i| over(i, model))
     }
 
-    /// ln E where the tabulated forces, weighted as in the mean, have changed by `step` in ln F.
-    /// None beyond the table's moduli.
+    /// ln E at which the tabulated forces, weighted as in the mean, have changed by `step` in ln F.
+    /// `None` outside the moduli of the table.
     fn limit(&self, contacts: &[Contact], fit: &Fit, step: f64) -> Option<f64> {
         let force = |log_modulus: f64| {
             let (mut value, mut slope) = (0.0, 0.0);
@@ -227,8 +228,8 @@ impl TabulatedContact {
             if (next - log_modulus).abs() < 1e-9 {
                 return Some(next);
             }
-            // The force grows with E: where the limit asks for more, there is none within the
-            // table.
+            // The force increases with E. If the limit requires more, there is no such modulus in
+            // the table.
             if next > highest && log_modulus == highest || next < lowest && log_modulus == lowest {
                 return None;
             }
@@ -259,7 +260,7 @@ impl TabulatedContact {
     }
 }
 
-/// ∂ln F/∂ln E, kept from zero.
+/// ∂ln F/∂ln E, with a positive lower limit.
 fn sensitivity(force: &TabulatedForce) -> f64 {
     force.modulus_slope.max(LEAST_SENSITIVITY)
 }
@@ -274,11 +275,11 @@ struct Contact {
 struct Fit {
     log_modulus: f64,
     mean: CommonMean,
-    /// ln E of each load alone.
+    /// ln E from each load alone.
     own: Vec<f64>,
-    /// ∂ln F/∂ln E, weighted as the mean.
+    /// ∂ln F/∂ln E, weighted like the mean.
     sensitivity: f64,
-    /// The best ln E lies above, below the table's.
+    /// Whether the best ln E is above or below those of the table.
     above: bool,
     below: bool,
 }

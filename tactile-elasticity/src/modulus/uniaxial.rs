@@ -1,24 +1,26 @@
-//! Specimens with a flat face, pressed without friction: strain and conjugate stress from the face's
-//! area.
+//! Specimens with a flat face, compressed without friction: strain and conjugate stress from the
+//! area of the face.
 //!
 //! Under uniaxial load a block or a cylinder of any outline deforms homogeneously: the face
-//! stretches by λ_t in its plane and by λ_z across it, and its area is A = A₀ λ_t². With a measure
-//! of strain f (Green–Lagrange: f(λ) = ½(λ² − 1)) and Poisson's ratio defined by the same measure,
-//! f(λ_t) = −ν f(λ_z), which for Hencky's measure and ν = ½ is incompressibility, λ_z λ_t² = 1. The
-//! stress conjugate to the measure does the work of the force: S df = (F/A₀) dλ_z, hence
+//! stretches by λ_t in its plane and by λ_z normal to it, and its area is A = A₀ λ_t². Let f be a
+//! strain measure (for Green–Lagrange f(λ) = ½(λ² − 1)), with Poisson's ratio defined by the same
+//! measure: f(λ_t) = −ν f(λ_z). For Hencky's measure and ν = ½ this is incompressibility, λ_z
+//! λ_t² = 1. The stress conjugate to the measure does the work of the force: S df = (F/A₀) dλ_z,
+//! hence
 //!
 //! S = F / (A₀ f′(λ_z)),
 //!
-//! the second Piola–Kirchhoff stress for Green–Lagrange, F/A₀ (engineering stress) for Biot's
-//! measure and J times the true stress F/A for Hencky's. Material law: S = E f(λ_z), equation (31).
+//! which is the second Piola–Kirchhoff stress for Green–Lagrange, F/A₀ (engineering stress) for
+//! Biot's measure, and J times the true stress F/A for Hencky's. The material law is S = E f(λ_z),
+//! equation (31).
 //!
-//! Frames show pressed faces only, so that A₀ is not measured. It is the area for which the line S
-//! over e passes through the origin: n loads determine the two unknowns E and A₀ from n ≥ 2. To
-//! first order E = 2ν ΔF/ΔA, which does not hold A₀ at all. The error of A₀ is of the order of that
-//! of E times the strain and is neglected.
+//! Frames show only pressed faces, so A₀ is not measured. It is the area for which the line of S
+//! over e passes through the origin: from n ≥ 2 loads, both unknowns E and A₀ are determined. To
+//! first order E = 2ν ΔF/ΔA, which does not contain A₀. The error of A₀ is of the order of that of
+//! E times the strain, and is neglected.
 //!
-//! Range: no friction. A face that sticks to the plate stretches less than the material above it,
-//! and E comes out too large.
+//! The method assumes no friction. A face that sticks to the plate stretches less than the material
+//! above it, so E is overestimated.
 
 use super::bodies::Bodies;
 use super::load::{LoadSeries, LoadState, validated};
@@ -29,13 +31,14 @@ use crate::strain::StrainMeasure;
 use nalgebra::Matrix3;
 use tactile_core::{Source, Uncertain};
 
-// Steps to the unloaded area: the error falls by about the strain each time, to rounding for
-// strains up to a third.
+// Maximum number of steps to the unloaded area. Each step reduces the error by a factor of about
+// the strain, down to rounding for strains up to a third.
 const AREA_STEPS: usize = 60;
-// Axial stretches that are considered: beyond them no law with one modulus holds.
+// Range of axial stretches. Outside it no law with a single modulus is valid.
 const STRETCHES: [f64; 2] = [0.05, 4.0];
 
-/// The loads of a specimen with a flat face, its areas turned into strains and conjugate stresses.
+/// The loads of a specimen with a flat face, with areas converted to strains and conjugate
+/// stresses.
 ///
 /// ```
 /// use tactile_elasticity::modulus::{
@@ -43,8 +46,8 @@ const STRETCHES: [f64; 2] = [0.05, 4.0];
 /// };
 /// use tactile_elasticity::strain::GreenLagrange;
 ///
-/// // A face of 1 cm² of 100 kPa and ν = ½, squeezed by e = 2 % and 5 %: λ_z = √(1 − 2e), A = A₀(1
-/// // + e), F = E e λ_z A₀.
+/// // A face of 1 cm² of 100 kPa and ν = ½, compressed by e = 2 % and 5 %: λ_z = √(1 − 2e),
+/// // A = A₀(1 + e), F = E e λ_z A₀.
 /// let load = |e: f64| LoadState::new(Estimate::new(100e3 * e * (1.0 - 2.0 * e).sqrt() * 1e-4, 1e-4))
 ///     .with_area(Estimate::new(1e-4 * (1.0 + e), 1e-9));
 /// let uniaxial = UniaxialLoads::new(
@@ -64,21 +67,21 @@ const STRETCHES: [f64; 2] = [0.05, 4.0];
 pub struct UniaxialLoads {
     /// The loads with their strains, for a [`StressStrainRegression`].
     pub series: LoadSeries,
-    /// Stretches of the face in its plane and across it, λ_t and λ_z, of every load.
+    /// Stretches of the face in its plane and normal to it, λ_t and λ_z, for each load.
     pub stretches: Vec<[f64; 2]>,
     /// Area of the unloaded face in m².
     pub unloaded_area_m2: f64,
 }
 
 impl UniaxialLoads {
-    /// Finds A₀ and the state of every load that has a contact area. The others have a force alone.
+    /// Finds A₀ and the state of each load that has a contact area. Other loads get only a force.
     /// O(loads).
     ///
     /// # Errors
-    /// [`ElasticityError::NotPositive`] for a Poisson ratio, from which there is no way back to the
-    /// axial strain, or an area. [`ElasticityError::TooFewLoads`] for fewer than two areas,
-    /// [`ElasticityError::EqualLoads`] and [`ElasticityError::ZeroStrain`] where they are all one,
-    /// [`ElasticityError::OppositeSigns`] where the face does not grow with the force.
+    /// [`ElasticityError::NotPositive`] for an area, or for a Poisson ratio that does not determine
+    /// the axial strain. [`ElasticityError::TooFewLoads`] for fewer than two areas,
+    /// [`ElasticityError::EqualLoads`] and [`ElasticityError::ZeroStrain`] if all are equal,
+    /// [`ElasticityError::OppositeSigns`] if the area does not increase with the force.
     pub fn new(
         series: &LoadSeries,
         poisson_ratio: f64,
@@ -100,7 +103,7 @@ impl UniaxialLoads {
             let line = regression.line(&StressStrainRegression::points(
                 &law.strained(series, unloaded)?.0,
             )?)?;
-            // The strain at which the line has no stress is that of the unloaded face.
+            // The strain at which the line has zero stress is that of the unloaded face.
             let strain = -line.intercept / line.slope;
             let ratio = (1.0
                 - 2.0 * law.poisson_ratio * strain.clamp(-LINEAR_STRAIN, LINEAR_STRAIN))
@@ -126,24 +129,24 @@ struct LateralLaw<'a> {
 }
 
 impl LateralLaw<'_> {
-    /// λ_z of a face that has stretched by λ_t.
+    /// λ_z of a face stretched by λ_t.
     fn axial(&self, lateral: f64) -> Result<f64, ElasticityError> {
         let wanted = -strain_of(self.measure, lateral)? / self.poisson_ratio;
         stretch_of(self.measure, wanted)
     }
 
-    /// f′ of a stretch.
+    /// f′ at a stretch.
     fn slope(&self, stretch: f64) -> Result<f64, ElasticityError> {
         Ok(self.measure.conjugate_stress(1.0, stretch)?.recip())
     }
 
-    /// The loads with their strains, and the stretches of each.
+    /// The loads with their strains, and the stretches of each load.
     fn strained(
         &self,
         series: &LoadSeries,
         unloaded_m2: f64,
     ) -> Result<(Vec<LoadState>, Vec<[f64; 2]>), ElasticityError> {
-        // Strains that lateral stretches give are in inverse proportion to Poisson's ratio.
+        // Strains from lateral stretches are inversely proportional to Poisson's ratio.
         let ratio = series.bodies().map(Bodies::poisson_ratio);
         let ratio_error = ratio.map_or(0.0, |ratio| ratio.part(Source::PoissonRatio));
         let relative_ratio = ratio_error / self.poisson_ratio;
@@ -171,7 +174,7 @@ impl LateralLaw<'_> {
                     face.degrees_of_freedom(Source::Noise),
                 )
                 .by_relative(Source::PoissonRatio, -relative_ratio);
-            // What all faces have in common is in A₀, which is fitted to them, and not in strains.
+            // Errors common to all faces affect A₀, which is fitted, and not the strains.
             let common = face.without(Source::Noise) * face.value.recip();
             loads.push(LoadState {
                 contact_area_m2: Some(common * (unloaded_m2 * axial_slope)),
@@ -191,7 +194,7 @@ fn strain_of(measure: &dyn StrainMeasure, stretch: f64) -> Result<f64, Elasticit
     Ok(measure.strain(&gradient)?[(2, 2)])
 }
 
-/// The stretch of a strain along an axis, by bisection: f rises with the stretch, whatever the
+/// The stretch for a strain along an axis, by bisection: f increases with the stretch for every
 /// measure.
 fn stretch_of(measure: &dyn StrainMeasure, wanted: f64) -> Result<f64, ElasticityError> {
     let [mut low, mut high] = STRETCHES;
@@ -212,16 +215,16 @@ fn stretch_of(measure: &dyn StrainMeasure, wanted: f64) -> Result<f64, Elasticit
     Ok(0.5 * (low + high))
 }
 
-/// By how much the ratio of conjugate stress to strain of a rubber that is stretched along one axis
-/// exceeds its modulus, relative, at a strain of this measure.
+/// Relative excess of the ratio of conjugate stress to strain over the modulus, for a uniaxially
+/// stretched rubber at a strain of this measure.
 ///
-/// An incompressible neo-Hookean solid has the nominal stress P = E (λ − λ⁻²)/3. Its
-/// [conjugate stress](StrainMeasure::conjugate_stress) over the strain is E at small strain alone:
-/// at −9 % it is 1.28 E for Green–Lagrange's measure, 0.96 E for Hencky's.
+/// An incompressible neo-Hookean solid has the nominal stress P = E (λ − λ⁻²)/3. Its [conjugate
+/// stress](StrainMeasure::conjugate_stress) over the strain equals E only at small strain: at −9 %
+/// it is 1.28 E for Green–Lagrange and 0.96 E for Hencky.
 ///
 /// # Errors
-/// [`ElasticityError::NoConjugateStress`], [`ElasticityError::SingularDeformation`] for a strain
-/// that no stretch from 0.05 to 4 has.
+/// [`ElasticityError::NoConjugateStress`], and [`ElasticityError::SingularDeformation`] for a
+/// strain without a stretch between 0.05 and 4.
 ///
 /// ```
 /// use tactile_elasticity::modulus::neo_hookean_excess;

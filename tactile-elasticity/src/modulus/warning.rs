@@ -1,6 +1,6 @@
-//! What weakens a modulus without forbidding it.
+//! Warnings that weaken a modulus without preventing it.
 
-/// A typed caution. The estimate stands, but not unconditionally.
+/// A typed caution. The estimate is valid with a reservation.
 ///
 /// ```
 /// use tactile_elasticity::modulus::Warning;
@@ -12,7 +12,7 @@
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum Warning {
-    /// a/R is beyond the reach of small-contact theory.
+    /// a/R is outside the range of small-contact theory.
     LargeContact {
         /// Index of the load.
         load: usize,
@@ -21,7 +21,7 @@ pub enum Warning {
         /// The limit of the law.
         limit: f64,
     },
-    /// The layer is thin beside the contact for this law.
+    /// The layer is too thin for this law, compared with the contact.
     ThinLayer {
         /// Index of the load.
         load: usize,
@@ -39,8 +39,8 @@ pub enum Warning {
         /// The limit.
         limit: f64,
     },
-    /// The residuals are larger than the standard errors say. These were scaled up by the square
-    /// root of this.
+    /// The residuals exceed the standard errors, which were scaled up by the square root of this
+    /// ratio.
     ExcessScatter {
         /// χ² over degrees of freedom.
         reduced_chi_squared: f64,
@@ -51,42 +51,42 @@ pub enum Warning {
     Intercept {
         /// Stress at zero strain, Pa.
         intercept_pa: f64,
-        /// Its probability under a zero intercept.
+        /// Probability of such an intercept if the true one is zero.
         p_value: f64,
     },
-    /// One load and no standard errors: the interval is not known.
+    /// There is one load without standard errors, so the interval is unknown.
     NoErrorEstimate,
-    /// For a sphere the ratio of stress to strain is not the modulus: it depends on load and
-    /// radius.
+    /// For a sphere the ratio of stress to strain is not the modulus, because it depends on load
+    /// and radius.
     RatioOnSphere {
         /// Index of the load.
         load: usize,
         /// a/R.
         ratio: f64,
     },
-    /// The modulus is far from that of every layer of the guide, so that it is badly determined, or
-    /// one of the inputs is in another unit.
+    /// The modulus is far from that of every layer of the guide. It is then poorly determined, or
+    /// an input has a wrong unit.
     UnlikeGuide {
-        /// Modulus over that of the layer that is most like it.
+        /// Ratio of the modulus to that of the closest layer.
         ratio: f64,
     },
-    /// A contact is beyond what the law describes, and was not used.
+    /// A contact is outside the range of the law and was skipped.
     OutOfReach {
         /// Index of the load.
         load: usize,
     },
-    /// The sample is pressed on a guide that yields, and the estimator takes it for rigid: the
+    /// The sample is pressed on a compliant guide, but the estimator treats the guide as rigid: the
     /// modulus is that of sample and guide together.
     GuideIgnored,
-    /// Poisson's ratio is negative, which no rubber, gel or tissue has.
+    /// Poisson's ratio is negative, unlike that of any rubber, gel or tissue.
     NegativePoissonRatio {
-        /// As it was stated.
+        /// Stated Poisson ratio.
         poisson_ratio: f64,
     },
 }
 
 impl Warning {
-    /// From this ratio of moduli on a sample is [unlike](Self::UnlikeGuide) its guide.
+    /// Ratio of moduli from which a sample is [unlike](Self::UnlikeGuide) its guide.
     pub const UNLIKE_GUIDE: f64 = 10.0;
 }
 
