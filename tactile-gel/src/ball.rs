@@ -1,29 +1,29 @@
-//! What the light itself says about the pressed ball: its size, and whether the face is a sphere or
-//! a paraboloid.
+//! What the light reveals about the pressed ball: its size, and whether the face is a sphere or a
+//! paraboloid.
 //!
-//! Of a matt face far from shadows the level of a channel is linear in the unit normal, whose third
-//! component follows from the other two: 1 − n_z grows as (s r)²/2 + (s r)⁴/8 for a sphere, if s is
-//! the factor by which the ball is smaller than stated. The ratio of both terms gives s. A frame
-//! that was drawn from Hertz's law is a paraboloid. Real gels are not quite matt, so that the
-//! evidence counts only where the linear law leaves little.
+//! For a matt face far from shadows, the level of a channel is linear in the unit normal. The third
+//! component of the normal follows from the other two: for a sphere 1 − n_z is (s r)²/2 + (s
+//! r)⁴/8 + …, where s is the factor by which the ball is smaller than stated. The ratio of both
+//! terms gives s. A frame simulated from Hertz's law shows a paraboloid. Real gels are not
+//! perfectly matt, so the evidence counts only if the linear law leaves small residuals.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::gradients::Blurred;
 
-/// The shape of a face over a ball.
+/// Shape of the face over a ball.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum BallFace {
-    /// The ball's own: slopes r/√(R² − r²).
+    /// The ball itself: slopes r/√(R² − r²).
     Sphere,
-    /// That of Hertz's law: slopes r/R.
+    /// Hertz's law: slopes r/R.
     Paraboloid,
 }
 
 impl BallFace {
-    /// Components n_x and n_y of the unit normal at a place in radii of the ball.
+    /// Components n_x and n_y of the unit normal at a position in radii of the ball.
     pub fn normal(self, [x, y]: [f64; 2]) -> [f64; 2] {
         match self {
             Self::Sphere => [x, y],
@@ -31,7 +31,7 @@ impl BallFace {
         }
     }
 
-    /// Depth below a rim of radius `rim` at a distance, in radii of the ball.
+    /// Depth below a rim of radius `rim` at a distance from the centre, in radii of the ball.
     pub fn depth(self, distance: f64, rim: f64) -> f64 {
         let up = |r: f64| match self {
             Self::Sphere => (1.0 - r * r).max(0.0).sqrt(),
@@ -41,15 +41,17 @@ impl BallFace {
     }
 }
 
-/// Factors by which the ball could be smaller than stated.
+/// Tested factors by which the ball may be smaller than stated.
 const FACTORS: [f64; 11] = [0.4, 0.5, 0.63, 0.8, 0.9, 1.0, 1.1, 1.25, 1.6, 2.0, 2.5];
-/// Terms: three components of the normal less that of the flat face, times 1, x and y.
+/// Number of terms: the three components of the normal minus those of the flat face, times 1, x and
+/// y.
 const TERMS: usize = 9;
-/// The linear law holds if it leaves less than this multiple of the noise's variance.
+/// The linear law is accepted if its residuals are below this multiple of the noise variance.
 const LINEAR: f64 = 2.0;
-/// Another shape or size must leave this much less than the stated one.
+/// Another shape or size is accepted if its residuals are smaller than the stated one's by this
+/// factor.
 const EVIDENCE: f64 = 1.15;
-/// Factors within this of 1 are no doubt: light is not that linear.
+/// Factors in this range around 1 raise no doubt, because light is not exactly linear.
 const SURE: [f64; 2] = [0.75, 1.3];
 
 /// Sums for one shape and factor.
@@ -69,7 +71,8 @@ pub(crate) struct Evidence {
     rough: Vec<f32>,
 }
 
-/// The face of the balls, and a doubtful size: the factor by which they are smaller than stated.
+/// Shape of the face over the balls, and the factor by which they are smaller than stated if their
+/// size is doubtful.
 pub(crate) struct Verdict {
     pub face: BallFace,
     pub factor: Option<f64>,
@@ -95,7 +98,7 @@ impl Evidence {
         }
     }
 
-    /// Adds the press in a circle, lengths in pixels.
+    /// Adds the press in a circle. Lengths are in pixels.
     pub(crate) fn add(
         &mut self,
         frame: &Blurred,
@@ -122,7 +125,7 @@ impl Evidence {
                     continue;
                 }
                 let level = difference(row, column);
-                // Neighbours at this distance share no noise.
+                // Pixels at this distance share no noise.
                 if column >= 5 && column + 5 < columns {
                     let beside = [difference(row, column - 5), difference(row, column + 5)];
                     let bend = |k: usize| beside[0][k] + beside[1][k] - 2.0 * level[k];
@@ -147,7 +150,8 @@ impl Evidence {
             face: BallFace::Sphere,
             factor: None,
         };
-        // Second differences of noise have six times its variance, and a face bends little.
+        // Second differences of noise have six times its variance, and the face is nearly straight
+        // over three pixels.
         let noise = f64::from(crate::contacts::quantile(&mut self.rough, 0.5)) * 1.4826;
         let noise = (noise * noise / 6.0).max(0.01);
         let left = |fit: &Fit| fit.left(self.levels).map(|left| left / self.count);
@@ -186,7 +190,7 @@ impl Fit {
         let at = [self.factor * x, self.factor * y];
         let [nx, ny] = self.face.normal(at);
         let up = 1.0 - nx * nx - ny * ny;
-        // A ball of this size does not reach as far: the fit is worse for it.
+        // A ball of this size does not reach this far, which makes the fit worse.
         let components = [nx, ny, up.max(0.0).sqrt() - 1.0];
         let terms: [f64; TERMS] = core::array::from_fn(|k| components[k % 3] * place[k / 3]);
         for (i, a) in terms.iter().enumerate() {
@@ -199,7 +203,7 @@ impl Fit {
         }
     }
 
-    /// Sum of squares that the linear law leaves of those of the levels.
+    /// Residual sum of squares of the levels under the linear law.
     fn left(&self, levels: f64) -> Option<f64> {
         let factor = self.square.clone().cholesky()?;
         let explained: f64 = self.right.iter().map(|r| r.dot(&factor.solve(r))).sum();

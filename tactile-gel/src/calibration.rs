@@ -1,4 +1,5 @@
-//! A gel's sensor from presses of balls of known radius, with or without drawn circles.
+//! Calibration of a gel sensor from presses of balls of known radius, with or without drawn
+//! circles.
 
 use nalgebra::DMatrix;
 use ndarray::{Array2, ArrayView3};
@@ -14,20 +15,20 @@ use crate::gradients::{Blurred, TERMS, samples};
 use crate::model::GelModel;
 use crate::sensor::{GelSensor, colour_image};
 
-/// Pixels inside of the contact's edge that the polynomial is not fitted in: the blur of the frames
-/// mixes them with the free gel.
+/// Margin in pixels inside the edge of the contact, where the polynomial is not fitted: the blur of
+/// the frames mixes contact and free gel there.
 const RIM_PX: f64 = 1.5;
-/// Relative error of slopes that all presses of a calibration share, and their scatter cannot show:
-/// that of gels whose faces are known.
+/// Relative error of slopes that is common to all presses of a calibration and therefore not
+/// visible in their scatter. It was measured on gels with known faces.
 const COMMON_ERROR: f64 = 0.012;
 /// Fewer used presses leave much of the frame and of the slopes unseen.
 const ENOUGH_PRESSES: usize = 5;
 /// Median angle in degrees beyond which lamps, pixel size or circles are in doubt.
 const LARGE_ANGLE_DEG: f64 = 10.0;
-/// A ball whose contacts reach to a smaller share of its radius is hardly pressed, or stated in
-/// another unit.
+/// If the contacts reach only to a smaller fraction of the ball's radius, the ball is hardly
+/// pressed or its unit is wrong.
 const SMALL_SHARE: f64 = 0.02;
-/// Sizes in metres beyond which a pixel or a ball is likely in another unit.
+/// Sizes in metres above which the unit of a pixel or a ball is probably wrong.
 const LARGE_PIXEL_M: f64 = 1e-3;
 const LARGE_BALL_M: f64 = 0.2;
 
@@ -38,7 +39,7 @@ pub struct BallPress<'a> {
     pub frame: ArrayView3<'a, u8>,
     /// Radius of the ball in metres.
     pub ball_radius_m: f64,
-    /// Contact circle as a user drew it: x and y of the centre and radius, in pixels.
+    /// Contact circle drawn by a user: x and y of the centre and radius, in pixels.
     pub circle_px: Option<[f64; 3]>,
 }
 
@@ -47,32 +48,32 @@ pub struct BallPress<'a> {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct CircleFinding {
-    /// The circle as drawn.
+    /// The drawn circle. `None` if the user drew none.
     pub drawn_px: Option<[f64; 3]>,
-    /// The circle found in the frame. `None` where no contact was found.
+    /// The circle found in the frame. `None` if no contact was found.
     pub found_px: Option<[f64; 3]>,
-    /// The circle that the model was fitted with. `None` for a press that was left out.
+    /// The circle used for the fit. `None` if the press was left out.
     pub used_px: Option<[f64; 3]>,
-    /// Distance in pixels by which the drawn circle misses the found one, in centre or radius, less
-    /// the offset that all drawn circles share.
+    /// Distance in pixels between the drawn and the found circle, in centre or radius, after
+    /// subtracting the offset common to all drawn circles.
     pub misfit_px: Option<f64>,
     /// Whether the drawn circle is wrong.
     pub wrong: bool,
 }
 
-/// How the presses of a calibration were read.
+/// Report of a calibration.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct CalibrationReport {
-    /// Circles of the presses, in their order.
+    /// Circles of the presses, in order.
     pub circles: Vec<CircleFinding>,
     /// Median offset of the drawn circles from the found ones: x, y, radius, in pixels.
     pub offset_px: [f64; 3],
-    /// Median angle in degrees between the normals of a press and those found without it.
+    /// Median leave-one-out angle in degrees between the normals of a press and the predicted ones.
     pub median_angle_deg: f64,
-    /// The shape that the light shows of the pressed faces.
+    /// Shape of the pressed faces according to the light.
     pub face: BallFace,
-    /// Why the sensor may be wrong.
+    /// Why the calibrated sensor may be wrong.
     pub doubts: Vec<CalibrationDoubt>,
 }
 
@@ -81,32 +82,32 @@ pub struct CalibrationReport {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum CalibrationDoubt {
-    /// Presses used, of those given.
+    /// Few of the given presses were used.
     FewPresses {
         /// Presses used.
         used: usize,
         /// Presses given.
         given: usize,
     },
-    /// The median angle between the normals of a press and those found without it, in degrees.
+    /// The leave-one-out normals are far off: the median angle in degrees.
     LargeAngle(f64),
-    /// The light fits a ball that is smaller than stated by this factor.
+    /// The light corresponds to a ball that is smaller than stated by this factor.
     BallSize(f64),
-    /// Contacts reach to this share of the ball's radius.
+    /// The contacts reach only to this fraction of the ball's radius.
     FlatBall(f64),
-    /// A length in metres that is likely stated in another unit.
+    /// A length in metres is unusually large, probably because of a wrong unit.
     LargeLength(f64),
     /// A press, counted from 0, is no frame of the reference's sensor.
     OtherFrame {
         /// The press.
         press: usize,
-        /// What differs.
+        /// The difference.
         doubt: FrameDoubt,
     },
 }
 
 impl CalibrationDoubt {
-    /// A word that programs recognise it by.
+    /// A keyword for programs.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::FewPresses { .. } => "few_presses",
@@ -152,7 +153,7 @@ impl core::fmt::Display for CalibrationDoubt {
     }
 }
 
-/// Sums of the normal equations: terms by terms and terms by (n_x, n_y).
+/// Sums of the normal equations: terms by terms, and terms by (n_x, n_y).
 #[derive(Clone)]
 struct Sums {
     square: DMatrix<f64>,
@@ -169,10 +170,10 @@ impl Sums {
         }
     }
 
-    /// Sums over rows of terms, then n_x and n_y.
+    /// Computes the sums over rows that hold the terms, then n_x and n_y.
     fn of(rows: &[f64]) -> Self {
         let all = DMatrix::from_row_slice(rows.len() / (TERMS + 2), TERMS + 2, rows);
-        // One product of matrices gives both sides of the normal equations.
+        // One matrix product gives both sides of the normal equations.
         let products = all.tr_mul(&all);
         Self {
             square: products.view((0, 0), (TERMS, TERMS)).into_owned(),
@@ -187,8 +188,8 @@ impl Sums {
         self.count += sign * other.count;
     }
 
-    /// Ridge regression. The penalty of a ten-thousandth of the number of samples binds terms that
-    /// the presses do not determine and moves the others by less than their errors.
+    /// Ridge regression. The penalty is a ten-thousandth of the number of samples. It keeps terms
+    /// bounded that the presses do not determine, and changes the others by less than their errors.
     fn solve(&self) -> Result<[Vec<f64>; 2], GelError> {
         let mut square = self.square.clone();
         for k in 0..TERMS {
@@ -204,23 +205,25 @@ impl Sums {
 impl GelSensor {
     /// Calibrates a sensor from its frame without contact and at least three presses of balls.
     ///
-    /// Circles and polynomial are found in turn: the polynomial from the circles by ridge
-    /// regression, the circles from the contacts that its normals show, until no circle moves by a
-    /// tenth of a pixel. Without drawn circles the start is the patch of large colour differences.
+    /// Circles and polynomial are determined alternately: the polynomial from the circles by ridge
+    /// regression, and the circles from the contacts in its normals, until no circle changes by a
+    /// tenth of a pixel. Without drawn circles, the start is the region of large colour
+    /// differences.
     ///
-    /// A circle drawn by hand may be off by some pixels. The median offset between drawn and found
-    /// circles is the user's convention of where a contact ends, and it is kept. Beyond it the
-    /// found circles are used. A drawn circle is wrong if it misses by more than three times
-    /// the median misfit and more than a tenth of the ball's radius.
+    /// A circle drawn by hand may be off by several pixels. The median offset between drawn and
+    /// found circles is the user's convention for the edge of a contact, and is kept. Apart from
+    /// this offset, the found circles are used. A drawn circle is wrong if it is off by more than
+    /// three times the median misfit and more than a tenth of the ball's radius.
     ///
-    /// Errors are those of presses left out in turn: the quantile of 68.3 % of the differences to
-    /// the ball in the circle, drawn where it is not wrong. That of all slopes together has the
-    /// scatter of the presses, for few of them by Student's distribution.
+    /// Errors come from leaving out one press at a time: they are the 68.3 % quantile of the
+    /// differences to the ball in the circle, which is the drawn one unless it is wrong. The common
+    /// error of all slopes comes from the scatter of the presses, by Student's distribution for few
+    /// presses.
     ///
     /// # Errors
     /// [`GelError::TooFewPresses`], [`GelError::ShapeMismatch`], [`GelError::InvalidOption`] for
-    /// lengths that are not positive, [`GelError::OtherFrames`] if most presses are no frames of the
-    /// reference's sensor.
+    /// lengths that are not positive, [`GelError::OtherFrames`] if most presses do not come from
+    /// the sensor of the reference.
     pub fn calibrate(
         reference: ArrayView3<'_, u8>,
         pixel_size_m: f64,
@@ -297,7 +300,7 @@ fn enough(available: usize) -> Result<(), GelError> {
     Ok(())
 }
 
-/// Circles, and the sums of the polynomial within them.
+/// Circles, with the sums of the polynomial inside them.
 struct Fitted {
     face: BallFace,
     circles: Vec<CircleFinding>,
@@ -328,7 +331,8 @@ impl Fitted {
         })
     }
 
-    /// The model with its errors, and the median angle in degrees, from presses left out in turn.
+    /// The model with its errors and the median angle in degrees, from leaving out one press at a
+    /// time.
     fn judged(&self, blank: &GelSensor, presses: &[Press]) -> Result<(GelModel, f64), GelError> {
         let pixel_size_m = blank.model.pixel_size_m;
         let mut misses = Misses::default();
@@ -336,7 +340,8 @@ impl Fitted {
             let kept = circle.drawn_px.filter(|_| !circle.wrong).or(circle.used_px);
             if let Some(circle) = kept {
                 let mut others = self.total.clone();
-                // Sums of the normal equations add over presses. Leaving one out is a subtraction.
+                // The sums of the normal equations are additive over presses, so a press is left
+                // out by subtraction.
                 others.add(sums, -1.0);
                 let model = GelModel::new(pixel_size_m, others.solve()?);
                 let without = blank.with_model(model);
@@ -373,25 +378,26 @@ impl Fitted {
     }
 }
 
-/// Standard error of a scale of 1 from its values in presses: their root mean square from 1, wider
-/// for few of them as Student's distribution is.
+/// Standard error of a scale of 1 from its values in the presses: their root mean square deviation
+/// from 1, widened for few presses by Student's distribution.
 fn scatter(scales: &[f64]) -> f64 {
     let n = scales.len() as f64;
     if n < 2.0 {
         return 1.0;
     }
     let square = scales.iter().map(|s| (s - 1.0).powi(2)).sum::<f64>() / n;
-    // Within 4 % of its quantiles of 97.5 % over the normal one's, from two degrees of freedom on.
+    // Accurate within 4 % for the ratio of the 97.5 % quantiles of Student's and the normal
+    // distribution, from two degrees of freedom on.
     let student = 1.0 + 1.35 / (n - 1.0) + 2.2 / (n - 1.0).powi(2);
     (square.sqrt() * (1.0 + 1.0 / n).sqrt() * student).hypot(COMMON_ERROR)
 }
 
-/// A press as it is computed with, lengths in pixels.
+/// A press prepared for the computation. Lengths are in pixels.
 struct Press {
     frame: Blurred,
     ball_px: f64,
     drawn: Option<[f64; 3]>,
-    /// Whether it is a frame of the reference's sensor.
+    /// Whether the frame comes from the sensor of the reference.
     own: bool,
 }
 
@@ -415,12 +421,13 @@ impl Press {
         Ok((press, doubts))
     }
 
-    /// A circle that a ball can make. Beyond 76° from the axis light shows no slope.
+    /// Limits the circle to one that a ball can make. Beyond 76° from the axis, light does not
+    /// depend on the slope.
     fn within(&self, [x, y, radius]: [f64; 3]) -> [f64; 3] {
         [x, y, radius.min(0.97 * self.ball_px)]
     }
 
-    /// Every third pixel of the inner contact.
+    /// Sums over every third pixel of the inner contact.
     fn sums(&self, reference: &Blurred, circle: Option<[f64; 3]>, face: BallFace) -> Sums {
         let Some([x0, y0, radius]) = circle.filter(|_| self.own) else {
             return Sums::new();
@@ -428,7 +435,7 @@ impl Press {
         let mut rows = Vec::new();
         samples(&self.frame, reference, |row, column, terms| {
             let [x, y] = [column as f64 - x0, row as f64 - y0];
-            // Neighbours share most of their noise after the blur, so that fewer pixels lose
+            // Neighbours share most of their noise after the blur, so using fewer pixels loses
             // little.
             if x.hypot(y) < radius - RIM_PX && (column + 7 * row).is_multiple_of(3) {
                 rows.extend(terms());
@@ -438,7 +445,7 @@ impl Press {
         Sums::of(&rows)
     }
 
-    /// The patch of large colour differences, where nothing better is known.
+    /// The region of large colour differences, as a first guess.
     fn start(&self, reference: &Blurred) -> [f64; 3] {
         let mut energy = Array2::zeros(reference.dim());
         samples(&self.frame, reference, |row, column, terms| {
@@ -460,7 +467,7 @@ impl Press {
         [x / weight, y / weight, radius.min(0.8 * self.ball_px)]
     }
 
-    /// Centroid and radius of equal area of the largest contact.
+    /// Centroid of the largest contact, and the radius of a circle of equal area.
     fn found(&self, sensor: &GelSensor) -> Option<[f64; 3]> {
         let patches = sensor.patches(&self.frame);
         let largest = patches.iter().max_by(|a, b| a.area.total_cmp(&b.area))?;
@@ -470,7 +477,7 @@ impl Press {
     }
 }
 
-/// The frame without contact is flat.
+/// Sums of the frame without contact, which is flat.
 fn flat(reference: &Blurred) -> Sums {
     let mut rows = Vec::new();
     samples(reference, reference, |row, column, terms| {
@@ -482,7 +489,7 @@ fn flat(reference: &Blurred) -> Sums {
     Sums::of(&rows)
 }
 
-/// Circles and polynomial in turn. `None` for presses in which no contact is found.
+/// Alternates circles and polynomial. `None` for presses in which no contact is found.
 fn find_circles(
     blank: &GelSensor,
     presses: &[Press],
@@ -522,7 +529,7 @@ fn find_circles(
     Ok(circles)
 }
 
-/// Drawn circles against found ones, and the offset that the drawn ones share.
+/// Compares drawn with found circles. Also returns the offset common to the drawn circles.
 fn judged(presses: &[Press], found: &[Option<[f64; 3]>]) -> (Vec<CircleFinding>, [f64; 3]) {
     let pairs = presses.iter().zip(found);
     let both = pairs
@@ -544,14 +551,14 @@ fn judged(presses: &[Press], found: &[Option<[f64; 3]>]) -> (Vec<CircleFinding>,
     let usual = quantile(&mut misfits, 0.5);
     let judge = |(press, found): (&Press, &Option<[f64; 3]>)| {
         let misfit_px = press.drawn.zip(*found).map(misfit);
-        // Where all circles are drawn well the median misfit is small. The second limit keeps them
-        // right.
+        // If all circles are drawn well, the median misfit is small. The second limit then prevents
+        // false alarms.
         let limit = (3.0 * usual).max(0.1 * press.ball_px);
         let shifted = found.map(|found| [0, 1, 2].map(|k| found[k] + offset[k]));
         CircleFinding {
             drawn_px: press.drawn,
             found_px: *found,
-            // A press without a contact found still counts with the circle that the user drew.
+            // A press without a found contact still counts, with the circle drawn by the user.
             used_px: shifted
                 .or(press.drawn)
                 .filter(|_| press.own)
@@ -563,14 +570,14 @@ fn judged(presses: &[Press], found: &[Option<[f64; 3]>]) -> (Vec<CircleFinding>,
     (pairs.map(judge).collect(), offset)
 }
 
-/// Differences between balls and what is found without their press.
+/// Differences between the balls and the leave-one-out predictions.
 #[derive(Default)]
 struct Misses {
-    /// Of gradients, in units of their errors for a normal's error of 1.
+    /// Differences of gradients, in units of their error for a unit error of the normal.
     gradients: Vec<f64>,
     depths: Vec<f64>,
     angles: Vec<f64>,
-    /// Slopes over those of the ball, one number a press.
+    /// Slopes relative to those of the ball, one number per press.
     scales: Vec<f64>,
 }
 
@@ -584,7 +591,7 @@ impl Misses {
     ) -> Result<(), GelError> {
         let reading = without.read_blurred(&press.frame, Vec::new())?;
         let ball = press.ball_px;
-        // Depth counts from the contact circle.
+        // Depth is measured from the contact circle.
         let (mut rim, mut ring) = (0.0, 0.0);
         for ((row, column), depth) in reading.depth_m.indexed_iter() {
             let distance = (column as f64 - x0).hypot(row as f64 - y0);
@@ -620,7 +627,7 @@ impl Misses {
             let length = |[p, q]: [f64; 2]| (1.0 + p * p + q * q).sqrt();
             let cosine =
                 (1.0 + found[0] * truth[0] + found[1] * truth[1]) / (length(found) * length(truth));
-            // Rounding can take the cosine of equal normals above 1.
+            // Rounding can raise the cosine of equal normals above 1.
             self.angles.push(cosine.min(1.0).acos().to_degrees());
         }
         if square > 0.0 {

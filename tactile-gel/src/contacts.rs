@@ -1,46 +1,47 @@
-//! Where something touches: patches of pressure, and the edge that a model of the pressure puts
-//! around each.
+//! Detection of contacts: regions of pressure, and the edge of each by a model of the pressure.
 //!
-//! The pressure comes from the slopes by the linear law of the face ([`Plane`]). Outside of
-//! a contact it vanishes. Inside it ends as √(distance to the edge): the face of a smooth object
-//! leaves it without a kink. The mean pressure at every distance from a patch's half height is
-//! fitted with that root, blurred as the frame is, so that neither blur nor threshold moves the edge.
-//! Where it does not fit, the face has a kink (a sharp rim, steep walls), and the edge is where the
-//! slope is largest.
+//! The pressure follows from the slopes by the linear law of the face ([`Plane`]). Outside a
+//! contact it vanishes. At the edge of a smooth object the face leaves it without a kink, and the
+//! pressure ends as √(distance to the edge). The mean pressure at each distance from the
+//! half-height contour of a region is fitted with this root, blurred like the frame, so that
+//! neither blur nor threshold shifts the edge. If the root does not fit, the face has a kink (a
+//! sharp rim or steep walls), and the edge is at the largest slope.
 
 use ndarray::{Array2, ArrayView2, Zip};
 use tactile_core::BoundingBox;
 
-/// Patches peak above this multiple of the smoothed pressure's noise. One in 10⁹ cells of noise
-/// does, and a frame has some 10⁴.
+/// Minimum peak of a region, in standard deviations of the smoothed pressure. By chance one cell in
+/// 10⁹ exceeds it, and a frame has about 10⁴.
 const LEAST_EVIDENCE: f32 = 6.0;
-/// Patches peak above this share of the strongest: the polynomial's error leaves some per cent of a
-/// deep contact beside it.
+/// Minimum peak of a region relative to the strongest: next to a deep contact, the error of the
+/// polynomial is several per cent of it.
 const LEAST_SHARE: f32 = 0.06;
-/// Patches have as many cells of 2 × 2 pixels: a contact of 3 pixels in radius.
+/// Minimum size of a region in cells of 2 × 2 pixels: a contact of 3 pixels radius.
 const LEAST_CELLS: usize = 8;
-/// Cells, at the most, that the spread of a field is taken of.
+/// Maximum number of cells used for the spread of a field.
 const SPREAD_CELLS: usize = 6400;
-/// Two peaks are two contacts if the pressure between them falls below this share of the lower.
+/// Two peaks are separate contacts if the pressure between them falls below this fraction of the
+/// lower one.
 const SADDLE: f32 = 0.5;
-/// Standard deviation in cells of the blur by frame, cell and bin.
+/// Standard deviation, in cells, of the blur by frame, cell and bin.
 const BLUR: f64 = 0.65;
-/// A larger misfit of the root than this share of the pressure, root mean square, is another edge.
+/// If the root mean square misfit of the root exceeds this fraction of the pressure, the edge is a
+/// kink.
 const ROOT_MISFIT: f64 = 0.04;
-/// Error of an edge in cells that remains without noise, from worlds whose edge is known.
+/// Error of an edge in cells that remains without noise, from scenes with known edges.
 const EDGE_ERROR: f64 = 0.12;
-/// Steps of the grid move the fitted root inwards by this many cells, in worlds of 10 to 50 px
+/// Discretisation shifts the fitted root inwards by this number of cells, in scenes of 10 to 50 px
 /// (`cargo run --release -p tactile-gel --example exact_worlds`).
 const ROOT_SHIFT: f64 = 0.09;
-/// Blur moves the largest slope at a kink inwards by this many cells.
+/// Blur shifts the largest slope at a kink inwards by this number of cells.
 const KINK_SHIFT: f64 = 0.15;
 
-/// A patch of pressure with its edge, in pixels of the frame.
+/// A region of pressure with its edge, in pixels of the frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Patch {
     /// Pixels inside, row by row.
     pub pixels: Vec<[usize; 2]>,
-    /// Pixels on the edge, by which the rim's level is taken.
+    /// Pixels on the edge, which define the level of the rim.
     pub rim: Vec<[usize; 2]>,
     /// Area in pixels.
     pub area: f64,
@@ -51,19 +52,19 @@ pub(crate) struct Patch {
 
 /// Pressure and slopes on cells of 2 × 2 pixels.
 pub(crate) struct Cells {
-    /// Along x and y.
+    /// Slopes along x and y.
     pub slopes: [Array2<f32>; 2],
     pub pressure: Array2<f32>,
 }
 
-/// Means over blocks of `size` pixels a side. Incomplete blocks are left out.
+/// Means over blocks of `size` × `size` pixels. Incomplete blocks are dropped.
 pub(crate) fn block_means(values: ArrayView2<'_, f32>, size: usize) -> Array2<f32> {
     let (rows, columns) = (values.nrows() / size, values.ncols() / size);
     let mut means = Array2::zeros((rows, columns));
     let share = 1.0 / (size * size) as f32;
     for (row, line) in values.outer_iter().enumerate().take(rows * size) {
         let mut to = means.row_mut(row / size);
-        // Arrays that were made here are slices.
+        // Arrays created here are contiguous.
         if let (Some(line), Some(to)) = (line.as_slice(), to.as_slice_mut()) {
             for (to, cell) in to.iter_mut().zip(line.chunks_exact(size)) {
                 *to += cell.iter().sum::<f32>() * share;
@@ -73,7 +74,7 @@ pub(crate) fn block_means(values: ArrayView2<'_, f32>, size: usize) -> Array2<f3
     means
 }
 
-/// Blurs by (1, 4, 6, 4, 1)/16 along both axes, so many times. The border is continued.
+/// Blurs `times` times by (1, 4, 6, 4, 1)/16 along both axes. The border is extended.
 pub(crate) fn blurred(image: &Array2<f32>, times: usize) -> Array2<f32> {
     let (rows, columns) = image.dim();
     let tap = |at: [f32; 5]| (at[0] + at[4] + 4.0 * (at[1] + at[3]) + 6.0 * at[2]) / 16.0;
@@ -106,7 +107,7 @@ pub(crate) fn blurred(image: &Array2<f32>, times: usize) -> Array2<f32> {
     image
 }
 
-/// A quantile of values, 0 without any.
+/// A quantile of values. 0 if there are none.
 pub(crate) fn quantile(values: &mut [f32], share: f64) -> f32 {
     if values.is_empty() {
         return 0.0;
@@ -115,9 +116,9 @@ pub(crate) fn quantile(values: &mut [f32], share: f64) -> f32 {
     *values.select_nth_unstable_by(at, f32::total_cmp).1
 }
 
-/// Standard deviation of most of a field, from its median absolute deviation.
+/// Standard deviation of the bulk of a field, from its median absolute deviation.
 pub(crate) fn spread(field: &Array2<f32>) -> f32 {
-    // Every third cell is enough for a median, of large fields fewer.
+    // Every third cell is enough for a median; for large fields fewer.
     let step = (field.len() / SPREAD_CELLS).max(3);
     let mut values: Vec<f32> = field.iter().step_by(step).copied().collect();
     let middle = quantile(&mut values, 0.5);
@@ -125,8 +126,8 @@ pub(crate) fn spread(field: &Array2<f32>) -> f32 {
     1.4826 * quantile(&mut values, 0.5)
 }
 
-/// The patches of a frame of `shape`, the strongest first. `noise_floor` is the least standard
-/// deviation that the smoothed pressure can have.
+/// The regions of a frame of `shape`, the strongest first. `noise_floor` is the minimum standard
+/// deviation of the smoothed pressure.
 pub(crate) fn patches(cells: &Cells, shape: (usize, usize), noise_floor: f32) -> Vec<Patch> {
     if cells.pressure.nrows() < 8 || cells.pressure.ncols() < 8 {
         return Vec::new();
@@ -136,7 +137,7 @@ pub(crate) fn patches(cells: &Cells, shape: (usize, usize), noise_floor: f32) ->
     let strongest = smooth.iter().copied().fold(0.0, f32::max);
     let threshold = (LEAST_EVIDENCE * noise).max(LEAST_SHARE * strongest);
     let (regions, peaks) = regions(&smooth, threshold);
-    // The noise of one cell before the blur that smooths by this factor.
+    // The noise of one cell, before the blur reduces it by this factor.
     let cell_noise = f64::from(spread(&(&cells.pressure - &blurred(&cells.pressure, 1))));
     let mut taken = Array2::from_elem(shape, false);
     let mut order: Vec<usize> = (0..peaks.len()).collect();
@@ -152,10 +153,10 @@ pub(crate) fn patches(cells: &Cells, shape: (usize, usize), noise_floor: f32) ->
     edged.collect()
 }
 
-/// Regions above a threshold, each around one peak, named from 1, and their peaks.
+/// Regions above a threshold, each around one peak and numbered from 1, with their peaks.
 ///
-/// Cells are taken from the highest downwards. Where two regions meet, the lower is a contact of its
-/// own if the saddle is below half of its peak.
+/// Cells are processed in descending order. If two regions meet, the lower one is a separate
+/// contact if the saddle is below half of its peak.
 fn regions(smooth: &Array2<f32>, threshold: f32) -> (Array2<u32>, Vec<f32>) {
     let (rows, columns) = smooth.dim();
     let mut cells: Vec<(f32, usize)> = smooth
@@ -165,7 +166,7 @@ fn regions(smooth: &Array2<f32>, threshold: f32) -> (Array2<u32>, Vec<f32>) {
         .map(|(at, v)| (*v, at))
         .collect();
     cells.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    // Peak, cells and the region that each has become a part of.
+    // Peak, number of cells, and the region into which each was merged.
     let mut found: Vec<(f32, usize, usize)> = Vec::new();
     let mut owner = vec![0_usize; rows * columns];
     let mut beside: Vec<usize> = Vec::new();
@@ -219,14 +220,15 @@ fn regions(smooth: &Array2<f32>, threshold: f32) -> (Array2<u32>, Vec<f32>) {
     (regions, peaks)
 }
 
-/// One region and the level that its core lies above.
+/// One region, with the level above which its core lies.
 struct Region<'a> {
     regions: &'a Array2<u32>,
     name: u32,
     level: f32,
 }
 
-/// Means over the cells at every distance from a core's outline, negative inside.
+/// Means over the cells at each distance from the outline of the core. Distances inside are
+/// negative.
 struct Profile {
     distance: Vec<f64>,
     count: Vec<f64>,
@@ -261,7 +263,7 @@ impl Region<'_> {
             [0.6 * radius, reach as f64],
         );
         let (edge, error) = profile.edge(radius, cell_noise)?;
-        // Steiner: an outline moved outwards by `edge`.
+        // Steiner's formula for an outline moved outwards by `edge`.
         let perimeter = perimeter(core);
         let area = area + perimeter * edge + core::f64::consts::PI * edge * edge;
         if area > 1.0 {
@@ -271,7 +273,7 @@ impl Region<'_> {
         }
     }
 
-    /// The pixels nearest to the core, as many as the area has, and those at the edge.
+    /// The pixels nearest to the core, in the number given by the area, and those at the edge.
     fn filled(
         &self,
         around: &BoundingBox,
@@ -280,7 +282,7 @@ impl Region<'_> {
         taken: &mut Array2<bool>,
     ) -> Option<Patch> {
         let (rows, columns) = distance.dim();
-        // Distances of pixels are linear between those of the cells.
+        // Distances of pixels are interpolated linearly between those of the cells.
         let split = |k: usize, n: usize| {
             let at = (0.5 * (k as f32 - 0.5)).clamp(0.0, (n - 1) as f32);
             let low = (at as usize).min(n.saturating_sub(2));
@@ -292,7 +294,7 @@ impl Region<'_> {
             for column in 0..2 * columns {
                 let (c, u) = split(column, columns);
                 let at = |r: usize, c: usize| distance[[r.min(rows - 1), c.min(columns - 1)]];
-                // Distances change by a cell from cell to cell.
+                // Distances change by at most one cell from cell to cell.
                 if f64::from(at(r, c)) > edge + 4.0 {
                     continue;
                 }
@@ -361,15 +363,15 @@ impl Profile {
         }
     }
 
-    /// Distance of the edge from the core's outline, and its standard error. `None` if the pressure
-    /// does not fall outwards.
+    /// Distance of the edge from the outline of the core, and its standard error. `None` if the
+    /// pressure does not decrease outwards.
     fn edge(&self, radius: f64, noise: f64) -> Option<(f64, f64)> {
         let last = *self.distance.last()?;
         let fit = |edge: f64| self.root(radius + edge, edge);
         let coarse = (0..).map(|k| -1.0 + 0.25 * f64::from(k));
         let coarse = coarse.take_while(|edge| *edge < last);
         let best = coarse.min_by(|a, b| fit(*a).0.total_cmp(&fit(*b).0))?;
-        // A parabola through three misfits around the least of the steps.
+        // A parabola through three misfits around the smallest one.
         let step = 0.25;
         let [left, middle, right] = [best - step, best, best + step].map(|edge| fit(edge).0);
         let bend = left + right - 2.0 * middle;
@@ -385,7 +387,7 @@ impl Profile {
         let bins = self.distance.len() as f64;
         let pixels: f64 = self.count.iter().sum();
         let excess = (misfit - 2.0 * bins * noise * noise).max(0.0) / pixels;
-        // χ² grows by 1 at one standard error. Neighbouring cells share some of their noise.
+        // χ² increases by 1 at one standard error. Neighbouring cells share some of their noise.
         let curvature = bend / (step * step);
         let spread = match curvature > 0.0 {
             true => (2.0 * (misfit / bins).max(noise * noise) / curvature).sqrt(),
@@ -395,13 +397,13 @@ impl Profile {
             return Some((edge + ROOT_SHIFT, spread.hypot(EDGE_ERROR)));
         }
         let kink = self.kink()?;
-        // Which of the two is right is open by a share of their distance.
+        // The uncertainty between the two models adds a fraction of their distance.
         Some((kink, (0.25 * (kink - edge)).hypot(2.0 * EDGE_ERROR)))
     }
 
-    /// Weighted misfit of c √(1 − (r/a)²), blurred, over a level, and c.
+    /// Weighted misfit of c √(1 − (r/a)²), blurred, above a level, and the fitted c.
     fn root(&self, radius: f64, edge: f64) -> (f64, f64) {
-        // Gauss–Hermite of five places.
+        // Five-point Gauss–Hermite rule.
         const NODES: [(f64, f64); 5] = [
             (-2.856_97, 0.011_257),
             (-1.355_626, 0.222_076),
@@ -446,7 +448,7 @@ impl Profile {
         (pp - p * p / n - height * product, height)
     }
 
-    /// Where the slope is largest, or falls by half at once.
+    /// Position of the largest slope, or of a sudden fall by half.
     fn kink(&self) -> Option<f64> {
         let all = || self.slope.iter().enumerate();
         let (at, top) = all().max_by(|a, b| a.1.total_cmp(b.1))?;
@@ -470,8 +472,8 @@ impl Profile {
     }
 }
 
-/// Length of a mask's outline in cells: that along the cells' sides, times π/4, which is right in
-/// the mean over all directions.
+/// Length of a mask's outline in cells: the length along the sides of the cells, times π/4, which
+/// is correct on average over all directions.
 fn perimeter(mask: ArrayView2<'_, bool>) -> f64 {
     let (rows, columns) = mask.dim();
     let at = |r: usize, c: usize| r < rows && c < columns && mask[[r, c]];
@@ -488,13 +490,13 @@ fn perimeter(mask: ArrayView2<'_, bool>) -> f64 {
     core::f64::consts::FRAC_PI_4 * sides as f64
 }
 
-/// Distance of every cell from a mask's outline, negative inside.
+/// Distance of each cell from a mask's outline. Distances inside are negative.
 fn signed_distance(mask: ArrayView2<'_, bool>) -> Array2<f32> {
     let [inside, outside] = [false, true].map(|to| distances(mask.mapv(|m| m == to)));
     Zip::from(&inside)
         .and(&outside)
         .map_collect(|inside, outside| {
-            // Cells are half a side from the outline beside them.
+            // The centre of a cell is half a side away from an adjacent outline.
             match *inside > 0.0 {
                 true => 0.5 - inside.sqrt(),
                 false => outside.sqrt() - 0.5,
@@ -508,7 +510,7 @@ fn distances(targets: Array2<bool>) -> Array2<f32> {
     let far = 1e9_f32;
     let mut square = targets.mapv(|target| if target { 0.0 } else { far });
     for axis in [0, 1] {
-        // Parabolas of the lower envelope, and where each begins.
+        // Parabolas of the lower envelope, with the start of each.
         let (mut values, mut envelope): (Vec<f32>, Vec<(usize, f32)>) = Default::default();
         for mut lane in square.lanes_mut(ndarray::Axis(axis)) {
             values.clear();

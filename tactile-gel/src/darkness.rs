@@ -1,4 +1,4 @@
-//! A gel that darkens where it is pressed: every contact, and the depth of each by a table.
+//! A gel that darkens where it is pressed: all contacts, and the depth of each from a table.
 
 use ndarray::{Array2, ArrayView2};
 use tactile_core::{Estimate, InvalidOption, Requirement, regions};
@@ -7,16 +7,16 @@ use tactile_sfs::DepthTable;
 use crate::GelError;
 use crate::error::same_shape;
 
-/// Patches of fewer pixels are specks of noise.
+/// Regions with fewer pixels are specks of noise.
 const LEAST_PIXELS: usize = 12;
 
-/// A gel that darkens with depth, and its table of darkness and depth.
+/// A gel that darkens with depth, with its table of darkness and depth.
 ///
 /// ```
 /// use ndarray::{Array2, s};
 /// use tactile_gel::DarkGel;
 /// use tactile_sfs::DepthTable;
-/// // A hundred grey levels darker is half a millimetre deep.
+/// // A hundred grey levels of darkening are half a millimetre of depth.
 /// let gel = DarkGel::new(DepthTable::new(&[(0.0, 0.0), (100.0, 5e-4)])?, 3.0, [1e-4; 2])?;
 /// let reference = Array2::from_elem((64, 64), 200_u8);
 /// let mut frame = reference.clone();
@@ -34,18 +34,18 @@ pub struct DarkGel {
     pixel_size_m: [f64; 2],
 }
 
-/// What a frame of a gel that darkens shows.
+/// Results of one frame of a gel that darkens.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct DarkFrame {
-    /// Depth in metres, NaN where nothing touches.
+    /// Depth in metres, NaN outside contacts.
     pub depth_m: Array2<f64>,
-    /// The contact of each pixel, counted from 1 in the order of [`contacts`](Self::contacts). 0
-    /// where nothing touches.
+    /// Number of each pixel's contact, counted from 1 in the order of [`contacts`](Self::contacts).
+    /// 0 outside contacts.
     pub labels: Array2<u16>,
     /// Contacts, the widest first.
     pub contacts: Vec<DarkPatch>,
-    /// Grey levels by which all of the frame is brighter than the reference.
+    /// Increase of the whole frame over the reference, in grey levels.
     pub background_step_grey: f64,
 }
 
@@ -54,27 +54,27 @@ pub struct DarkFrame {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct DarkPatch {
-    /// Column and row of the centroid. An outline that is uncertain by half a pixel, pixel by pixel,
-    /// moves that of a disc by 1/√(2 radius) of it.
+    /// Column and row of the centroid. The error corresponds to an outline that is uncertain by
+    /// half a pixel at each pixel: for a disc it is 1/√(2 radius) of that.
     pub centroid_px: [Estimate; 2],
     /// Area in square metres.
     pub area_m2: f64,
-    /// Greatest depth in metres, with the error of a grey level.
+    /// Maximum depth in metres, with the error from one grey level.
     pub depth_m: Estimate,
-    /// Greatest darkness in grey levels.
+    /// Maximum darkness in grey levels.
     pub darkness_grey: f64,
     /// Whether the contact reaches the frame's border.
     pub touches_border: bool,
-    /// Whether the darkness lies beyond the table, which ends with its last depth.
+    /// Whether the darkness is outside the table, whose last depth is then used.
     pub beyond_table: bool,
 }
 
 impl DarkGel {
-    /// With a table of darkness in grey levels and depth in metres, the darkness that counts as
-    /// contact, and the size of a pixel.
+    /// Creates the gel from a table of darkness in grey levels and depth in metres, the darkness
+    /// that counts as contact, and the size of a pixel.
     ///
     /// # Errors
-    /// For a size or a threshold that is not positive.
+    /// An error for a size or a threshold that is not positive.
     pub fn new(
         table: DepthTable<f64>,
         threshold_grey: f64,
@@ -91,9 +91,10 @@ impl DarkGel {
         })
     }
 
-    /// Every contact of a frame, and the depths of their pixels. O(pixels).
+    /// All contacts of a frame, and the depths of their pixels. O(pixels).
     ///
-    /// A step of all levels by more than the threshold is taken off by the frame's border.
+    /// If all levels change by more than the threshold, measured along the border of the frame, the
+    /// change is subtracted.
     ///
     /// # Errors
     /// [`GelError::ShapeMismatch`], [`GelError::EmptyImage`].
@@ -161,7 +162,7 @@ impl DarkGel {
     }
 }
 
-/// Median step of the levels along the border, a sixteenth of the frame on each side.
+/// Median change of the levels along the border, a sixteenth of the frame on each side.
 fn border_step(frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) -> f64 {
     let (rows, columns) = frame.dim();
     let (high, wide) = (rows.div_ceil(16), columns.div_ceil(16));

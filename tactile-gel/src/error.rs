@@ -1,4 +1,4 @@
-//! Errors, each with what was expected and what was found.
+//! Errors with the expected and the found values.
 
 use tactile_core::InvalidOption;
 use tactile_elasticity::ElasticityError;
@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use crate::frame_check::FrameDoubt;
 
-/// Why a gel's sensor has no answer.
+/// Why a gel sensor cannot give a result.
 ///
 /// ```
 /// use tactile_gel::{GelError, GelSensor};
@@ -30,14 +30,14 @@ pub enum GelError {
     /// Two inputs of one call differ in shape.
     #[error("the {input} has shape {found:?} but {expected:?} (rows, columns) is needed")]
     ShapeMismatch {
-        /// The input whose shape is wrong.
+        /// The input with the wrong shape.
         input: &'static str,
         /// Rows and columns needed.
         expected: [usize; 2],
         /// Rows and columns found.
         found: [usize; 2],
     },
-    /// An option outside its range.
+    /// An option is outside its range.
     #[error(transparent)]
     InvalidOption(#[from] InvalidOption),
     /// Too few presses show a contact.
@@ -48,23 +48,23 @@ pub enum GelError {
         /// Presses with a contact.
         available: usize,
     },
-    /// Presses are no frames of the reference's sensor.
+    /// Most presses do not come from the sensor of the reference.
     #[error("{presses} of {given} presses are no frames of the reference's sensor: {doubt}")]
     OtherFrames {
-        /// Presses that are none.
+        /// Number of such presses.
         presses: usize,
         /// Presses given.
         given: usize,
-        /// What the first of them shows.
+        /// The doubt about the first of them.
         doubt: FrameDoubt,
     },
     /// The presses do not determine the sensor.
     #[error("the presses do not determine the sensor")]
     NoSolution,
-    /// A frame of a known weight without contact.
+    /// A frame of a known weight shows no contact.
     #[error("a frame of a known weight shows no contact that carries a force")]
     NoContact,
-    /// A frame under one reading of a gauge with several contacts.
+    /// A frame under one gauge reading shows several contacts.
     #[error("a frame under one reading of a gauge shows several contacts")]
     SeveralContacts,
     /// The face cannot be integrated.
@@ -73,12 +73,12 @@ pub enum GelError {
     /// Markers cannot be followed.
     #[error("no markers to follow: {0}")]
     Markers(#[from] MatchError),
-    /// The law of the layer has no answer.
+    /// The law of the layer failed.
     #[error(transparent)]
     Law(#[from] ElasticityError),
 }
 
-/// Refuses an input of another shape.
+/// Rejects an input of another shape.
 pub(crate) fn same_shape(
     input: &'static str,
     expected: (usize, usize),

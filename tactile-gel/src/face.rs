@@ -1,4 +1,4 @@
-//! The face of the gel: gradients integrated over the frame, its rest far away, and the contacts.
+//! The face of the gel: integrated gradients, the rest level far away, and the contacts.
 
 use ndarray::{Array2, Axis};
 use tactile_core::Estimate;
@@ -11,23 +11,24 @@ use crate::model::GelModel;
 use crate::plane::Plane;
 use crate::rest::{Tails, rest};
 
-/// Cells of the coarse grid along the longer side of a frame.
+/// Number of cells of the coarse grid along the longer side of a frame.
 const COARSE: usize = 40;
-/// Variance in square pixels of the blur of the frames, which takes half of it times the face's
-/// Laplacian off its depth.
+/// Variance, in square pixels, of the blur of the frames. The blur reduces the depth by half of it
+/// times the Laplacian of the face.
 const BLUR: f64 = 1.0;
-/// Error of an integrated depth in pixels times slope, of noise that the calibration's scale does
-/// not hold.
+/// Error of an integrated depth in pixels times slope, from noise that the scale of the calibration
+/// does not include.
 const DEPTH_NOISE: f64 = 0.01;
-/// Slopes whose curl exceeds this share of their divergence, root mean square, are of no surface.
+/// Slopes are not those of a surface if the root mean square of their curl exceeds this fraction of
+/// that of their divergence.
 const CURL: f32 = 0.6;
-/// A face whose strong cells push outwards by this share of their weight is not pressed in.
+/// A face is not pressed in if its strong cells point outwards by this fraction of their weight.
 const OUTWARDS: f32 = -0.3;
 
-/// What one frame shows.
+/// Results of one frame.
 ///
-/// Gradients are those of the gel's surface, inside the contact and around it: ∂z/∂x and ∂z/∂y
-/// with z the depth in metres, x the column, y the row.
+/// Gradients are those of the gel's surface, inside and outside contacts: ∂z/∂x and ∂z/∂y with the
+/// depth z in metres, x along columns and y along rows.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct GelFrame {
@@ -36,22 +37,22 @@ pub struct GelFrame {
     /// Standard error of the components of the unit normal: see
     /// [`gradient_error`](Self::gradient_error).
     pub normal_standard_error: f64,
-    /// How far the face has moved into the gel, in metres, at every pixel. It is zero far away.
+    /// Displacement of the face into the gel, in metres, at each pixel. It is zero far away.
     pub depth_m: Array2<f64>,
-    /// Standard error of the depth of a pixel, and that of the rest that all count from, in metres.
+    /// Standard error of the depth of a pixel, and of the common rest level, in metres.
     pub depth_standard_error_m: [f64; 2],
-    /// Relative standard error of all slopes together.
+    /// Relative standard error common to all slopes.
     pub slope_standard_error: f64,
-    /// The contact of each pixel, counted from 1 in the order of [`contacts`](Self::contacts). 0
-    /// where nothing touches.
+    /// Number of each pixel's contact, counted from 1 in the order of [`contacts`](Self::contacts).
+    /// 0 outside contacts.
     pub labels: Array2<u16>,
-    /// Contacts, that of the highest pressure first.
+    /// Contacts in descending order of pressure.
     pub contacts: Vec<GelContact>,
-    /// Why the frame may not be this sensor's.
+    /// Why the frame may not come from this sensor.
     pub doubts: Vec<FrameDoubt>,
 }
 
-/// A place where something touches.
+/// A contact.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
@@ -60,11 +61,11 @@ pub struct GelContact {
     pub centroid_px: [Estimate; 2],
     /// Area in square metres.
     pub area_m2: Estimate,
-    /// Greatest depth in metres below the contact's own rim.
+    /// Maximum depth in metres below the contact's own rim.
     pub depth_m: Estimate,
-    /// Greatest depth in metres below the gel far away.
+    /// Maximum depth in metres below the gel far away.
     pub depth_below_far_m: Estimate,
-    /// Column and row of the greatest depth.
+    /// Column and row of the maximum depth.
     pub deepest_px: [usize; 2],
     /// Columns and rows of the outline, in order around the contact.
     #[cfg_attr(feature = "serde", serde(skip))]
@@ -74,7 +75,7 @@ pub struct GelContact {
 }
 
 impl GelFrame {
-    /// A frame that is not this sensor's.
+    /// The result for a frame that does not come from this sensor.
     pub(crate) fn refused(shape: (usize, usize), doubts: Vec<FrameDoubt>) -> Self {
         let none = || Array2::from_elem(shape, f32::NAN);
         Self {
@@ -89,8 +90,8 @@ impl GelFrame {
         }
     }
 
-    /// Standard errors of the gradients: those of the normal times the derivative of the gradient by
-    /// it, (1 + g gᵀ) √(1 + g²).
+    /// Standard errors of the gradients: those of the normal times the derivative of the gradient
+    /// by the normal, (1 + g gᵀ) √(1 + g²).
     pub fn gradient_error(&self) -> [Array2<f32>; 2] {
         let sd = self.normal_standard_error as f32;
         let [p, q] = &self.gradient;
@@ -100,19 +101,19 @@ impl GelFrame {
         })
     }
 
-    /// Whether nothing was read because the frame is not this sensor's.
+    /// Whether the frame was rejected because it does not come from this sensor.
     pub fn is_refused(&self) -> bool {
         self.doubts.iter().any(FrameDoubt::refuses)
     }
 }
 
-/// Standard errors of a gradient for one of the normal.
+/// Standard errors of a gradient for a unit error of the normal.
 pub(crate) fn gradient_errors([p, q]: [f32; 2]) -> [f32; 2] {
     let length = (1.0 + p * p + q * q).sqrt();
     [p, q].map(|own| length * ((1.0 + own * own).powi(2) + (p * q).powi(2)).sqrt())
 }
 
-/// The face and the contacts of slopes.
+/// Computes face and contacts from slopes.
 pub(crate) fn frame(
     (model, tails): (&GelModel, &Tails),
     gradient: [Array2<f32>; 2],
@@ -161,8 +162,8 @@ struct Face<'a> {
 }
 
 impl Face<'_> {
-    /// What the blur of the frames takes off the depth at a place: by the slopes' divergence over
-    /// 5 × 5 pixels.
+    /// Reduction of the depth at a position by the blur of the frames, from the divergence of the
+    /// slopes over 5 × 5 pixels.
     fn blurred_off(&self, [row, column]: [usize; 2]) -> f64 {
         let (rows, columns) = self.depth.dim();
         if row < 2 || column < 2 || row + 2 >= rows || column + 2 >= columns {
@@ -183,7 +184,7 @@ impl Face<'_> {
         let size = self.model.pixel_size_m;
         let n = patch.pixels.len() as f64;
         let mean = |axis: usize| patch.pixels.iter().map(|at| at[axis] as f64).sum::<f64>() / n;
-        // An outline that is off by an error of its own in each of some ten directions.
+        // The outline has an independent error in each of about ten directions.
         let centroid_error = 0.3 * patch.edge_error;
         let rim = patch
             .rim
@@ -225,7 +226,7 @@ impl Face<'_> {
     }
 }
 
-/// Whether slopes are of no face that is pressed in, on blocks of cells.
+/// Check whether slopes belong to a face that is pressed in, on blocks of cells.
 pub(crate) struct SurfaceCheck {
     block: usize,
     plane: Plane,
@@ -241,8 +242,8 @@ impl SurfaceCheck {
         }
     }
 
-    /// Whether the curl of slopes on cells is as large as their divergence, or the face comes out of
-    /// the gel.
+    /// Whether the curl of slopes on cells is as large as their divergence, or the face bulges out
+    /// of the gel.
     pub(crate) fn no_surface(&self, cells: &Cells, noise_floor: f32) -> bool {
         let [p, q] = cells
             .slopes
@@ -252,7 +253,7 @@ impl SurfaceCheck {
             return false;
         }
         let plane = &self.plane;
-        // Slopes end with the frame, which its outermost cells show.
+        // The outermost cells are affected by the end of the frame.
         let inner = |field: &Array2<f32>| {
             let (rows, columns) = field.dim();
             let field = field.slice_axis(Axis(0), (1..rows - 1).into());
@@ -277,7 +278,7 @@ impl SurfaceCheck {
     }
 }
 
-/// Pixels of a patch that have a neighbour outside, around it in order, as column and row.
+/// Pixels of a region with a neighbour outside, in order around it, as column and row.
 fn outline(pixels: &[[usize; 2]]) -> Vec<[usize; 2]> {
     let Some(&start) = pixels.first() else {
         return Vec::new();
@@ -298,7 +299,7 @@ fn outline(pixels: &[[usize; 2]]) -> Vec<[usize; 2]> {
     ];
     let (mut at, mut from) = ((start[0] as i64, start[1] as i64), 0);
     let mut line = vec![[start[1], start[0]]];
-    // Moore's tracing: the next pixel clockwise from where the last came.
+    // Moore tracing: the next pixel is the first one clockwise from the previous one.
     for _ in 0..4 * pixels.len() {
         let next = (1..=8).map(|k| (from + k) % 8).find(|k| {
             let (r, c) = AROUND[*k];

@@ -1,4 +1,4 @@
-//! The gel's layer, and the normal force from the shape of its face.
+//! The layer of the gel, and the normal force from the shape of its face.
 
 use ndarray::{Array2, ArrayView3};
 use tactile_core::Estimate;
@@ -8,33 +8,34 @@ use crate::layer::GelLayer;
 use crate::plane::{LayerShape, Plane};
 use crate::{GaugeForce, GelError, GelFrame, GelSensor, MarkerField};
 
-/// Blocks of pixels along the longer side of a frame. The force is a sum, and finer ones change it
+/// Blocks of pixels along the longer side of a frame. The force is a sum, so finer blocks change it
 /// little.
 const BLOCKS: usize = 64;
-/// Rounds of pressure from what is left of the slopes. Each leaves a tenth of the last's error.
+/// Number of rounds in which pressure is computed from the remaining slopes. Each round leaves a
+/// tenth of the previous error.
 const ROUNDS: usize = 5;
-/// Relative error of a force beside those of slopes and modulus, from layers under known pressures
-/// (`cargo run --release -p tactile-gel --example exact_worlds`).
+/// Relative error of a force in addition to those of slopes and modulus, from layers under known
+/// pressures (`cargo run --release -p tactile-gel --example exact_worlds`).
 const LAW_ERROR: f64 = 0.025;
 
 /// Forces from the shape of a gel's face, by the linear law of its layer.
 ///
-/// The pressure is that whose face has the gradients of the frame, also of the free gel around the
-/// contacts. It vanishes outside of them. In rounds, the pressure of what is left of the gradients
-/// is added, so that the frame's end cuts nothing off. Without friction, for slopes that are small.
-/// Five transforms a round.
+/// The pressure is zero outside contacts, and its face has the gradients of the frame, including
+/// those of the free gel around the contacts. In several rounds, the pressure of the remaining
+/// gradients is added, so that the end of the frame cuts nothing off. The law assumes no friction
+/// and small slopes. It takes five transforms per round.
 pub struct GelForce {
     plane: Plane,
     block: usize,
-    /// Newtons of 1 in a cell.
+    /// Force in newtons of a unit pressure in one cell.
     newtons: f64,
     modulus_error: f64,
     pixel_size_m: f64,
-    /// Pascals per metre of a face that moves sideways: that of the longest wave.
+    /// Pascals per metre of sideways displacement of the face: the value for the longest wave.
     shear_pa_per_m: f64,
 }
 
-/// Force and moments of all contacts of a frame, about the middle of the frame, along x, y and into the
+/// Total force and moments of the contacts of a frame about its centre, along x, y and into the
 /// gel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -46,11 +47,11 @@ pub struct GelWrench {
     pub torque_nm: [Option<Estimate>; 3],
 }
 
-/// How the forces of a sensor are found.
+/// Method that gives the forces of a sensor.
 pub enum GelLaw {
-    /// By the shape of the face and the gel's layer.
+    /// From the shape of the face and the layer of the gel.
     Layer(Box<GelForce>),
-    /// By the volume of the contacts, from a gauge's readings.
+    /// From the volume of the contacts, calibrated with gauge readings.
     Gauge(GaugeForce),
 }
 
@@ -63,13 +64,13 @@ impl GelLaw {
         }
     }
 
-    /// The normal force of all contacts together in newtons. `None` without contact.
+    /// The total normal force of all contacts in newtons. `None` without contact.
     pub fn force(&self, frame: &GelFrame) -> Option<Estimate> {
         together(self.forces(frame))
     }
 }
 
-/// The sum of forces, most of whose errors is common to all. `None` without any.
+/// The sum of forces whose errors are mostly common. `None` if there are none.
 fn together(forces: Vec<Estimate>) -> Option<Estimate> {
     forces.into_iter().reduce(|mut sum, force| {
         sum.value += force.value;
@@ -78,20 +79,20 @@ fn together(forces: Vec<Estimate>) -> Option<Estimate> {
     })
 }
 
-/// Pressure under a frame's contacts, in blocks.
+/// Pressure under the contacts of a frame, in blocks.
 struct Pressed {
     pressure: Array2<f32>,
     shares: Vec<Array2<f32>>,
     noise: f64,
-    /// Relative error of all of it.
+    /// Relative error common to the whole pressure.
     scale: f64,
 }
 
 impl GelForce {
-    /// For the frames of this sensor.
+    /// Creates the law for the frames of this sensor.
     ///
     /// # Errors
-    /// [`GelError::Law`] for a layer without thickness, modulus or a Poisson ratio.
+    /// [`GelError::Law`] for a layer with an invalid thickness, modulus or Poisson ratio.
     pub fn new(gel: &GelLayer, sensor: &GelSensor) -> Result<Self, GelError> {
         let (rows, columns) = sensor.shape();
         let block = rows.max(columns).div_ceil(BLOCKS).min(rows).min(columns);
@@ -122,14 +123,14 @@ impl GelForce {
             .collect()
     }
 
-    /// The normal force of all contacts together in newtons. `None` without contact.
+    /// The total normal force of all contacts in newtons. `None` without contact.
     pub fn force(&self, frame: &GelFrame) -> Option<Estimate> {
         together(self.forces(frame))
     }
 
-    /// Force and moments of all contacts together. F_z = ∫p dA, M_x = ∫p y dA and M_y = −∫p x dA are those of
-    /// the face's shape, F_x, F_y and M_z those of the markers
-    /// ([`MarkerField::shear`], with G/h of the layer). `None` without contact.
+    /// Total force and moments of all contacts. F_z = ∫p dA, M_x = ∫p y dA and M_y = −∫p x dA come
+    /// from the shape of the face; F_x, F_y and M_z come from the markers ([`MarkerField::shear`],
+    /// with G/h of the layer). `None` without contact.
     pub fn wrench(&self, frame: &GelFrame, markers: Option<&MarkerField>) -> Option<GelWrench> {
         let pressed = self.pressed(frame)?;
         let all = pressed
@@ -137,7 +138,7 @@ impl GelForce {
             .iter()
             .fold(Array2::zeros(pressed.pressure.dim()), |a, b| a + b);
         let (rows, columns) = frame.depth_m.dim();
-        // Metres from the middle of the frame to that of a block.
+        // Offset in metres of a block from the centre of the frame.
         let arm = |block: usize, pixels: usize| {
             let middle = (block as f64 + 0.5) * self.block as f64 - 0.5 * pixels as f64;
             self.pixel_size_m * middle
@@ -174,7 +175,7 @@ impl GelForce {
         Some(wrench)
     }
 
-    /// `None` without contact.
+    /// Computes the pressure. `None` without contact.
     fn pressed(&self, frame: &GelFrame) -> Option<Pressed> {
         if frame.contacts.is_empty() {
             return None;
@@ -197,7 +198,7 @@ impl GelForce {
             left_p = &p - &made_p;
             left_q = &q - &made_q;
         }
-        // Beside the contacts what is left is noise.
+        // Outside the contacts the remainder is noise.
         let beside = rest.iter().zip(&touched).filter(|(_, t)| **t == 0.0);
         let mut beside: Vec<f32> = beside.map(|(f, _)| f.abs()).collect();
         let noise = 1.4826 * f64::from(quantile(&mut beside, 0.5));
@@ -213,7 +214,7 @@ impl GelForce {
         })
     }
 
-    /// Each contact's share of the blocks: those with some of its pixels, by their number.
+    /// Fraction of each block that belongs to a contact, by the number of its pixels.
     fn shares(&self, frame: &GelFrame, shape: (usize, usize)) -> Vec<Array2<f32>> {
         let mut shares = vec![Array2::zeros(shape); frame.contacts.len()];
         for ((row, column), label) in frame.labels.indexed_iter() {
@@ -239,7 +240,7 @@ impl GelForce {
 }
 
 impl Pressed {
-    /// The sum over the blocks of a share, each times its arm.
+    /// The weighted sum over the blocks, each times its arm.
     fn moment(&self, share: &Array2<f32>, arm: impl Fn((usize, usize)) -> f64) -> Estimate {
         let (mut sum, mut square) = (0.0, 0.0);
         for ((at, f), s) in self.pressure.indexed_iter().zip(share) {
@@ -254,30 +255,30 @@ impl Pressed {
 }
 
 impl GelLayer {
-    /// G/h, by which the layer resists a face that moves sideways over more than its thickness, in
+    /// G/h, the resistance of the layer to a sideways displacement over more than its thickness, in
     /// pascals per metre.
     pub fn shear_pa_per_m(&self) -> f64 {
         self.youngs_modulus_pa / (2.0 * (1.0 + self.poisson_ratio) * self.thickness_m)
     }
 
-    /// The layer with the modulus under which a calibrated sensor reads frames of known weights:
-    /// frame and force in newtons.
+    /// Fits the modulus of the layer to frames under known weights, given as frame and force in
+    /// newtons.
     ///
-    /// # Errors
+    /// [`GelError::NoContact`] for a weight without contact, and the errors of [`GelSensor::read`].
     /// [`GelError::NoContact`] for a weight without contact, and those of [`GelSensor::read`].
     pub fn weighed(
         self,
         sensor: &GelSensor,
         weights: &[(ArrayView3<'_, u8>, Estimate)],
     ) -> Result<Self, GelError> {
-        // The law is linear, so that it is solved for a modulus of 1 Pa.
+        // The law is linear, so it is solved for a modulus of 1 Pa.
         let unit = Self {
             youngs_modulus_pa: 1.0,
             youngs_modulus_error_pa: 0.0,
             ..self
         };
         let law = GelForce::new(&unit, sensor)?;
-        // Each modulus is weighted by its relative error.
+        // The weight of each modulus follows from its relative error.
         let (mut sum, mut total) = (0.0, 0.0);
         let mut moduli = Vec::new();
         for (frame, force) in weights {
@@ -296,7 +297,7 @@ impl GelLayer {
         let mean = sum / total;
         let count = moduli.len() as f64;
         let square = moduli.iter().map(|e| (e / mean - 1.0).powi(2)).sum::<f64>() / count;
-        // Errors of depth are the sensor's own: more weights do not average them out.
+        // Errors of depth belong to the sensor and are not averaged out by more weights.
         let known = (count / total).sqrt();
         Ok(Self {
             youngs_modulus_pa: mean,

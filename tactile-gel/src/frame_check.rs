@@ -1,54 +1,55 @@
-//! Is a frame one of this sensor's? Its border against the reference's.
+//! Checks whether a frame comes from this sensor, by comparing its border with that of the
+//! reference.
 //!
-//! The border is compared in blocks of pixels: a contact covers some of them, and medians bear it.
-//! Levels of a channel change with exposure and white balance, the pattern of the light does not.
-//! Where the pattern is another, the same frame with exchanged channels, turned or mirrored is
-//! compared too, and what fits is named.
+//! The border is compared in blocks of pixels. A contact covers only some of them, which medians
+//! tolerate. Exposure and white balance change the levels of a channel, but not the pattern of the
+//! light. If the pattern differs, the frame is also compared with exchanged channels, rotated and
+//! mirrored, and the variant that fits is reported.
 
 use ndarray::Array3;
 use tactile_core::statistics::{median, quantile};
 
 use crate::gradients::Blurred;
 
-/// Side in pixels of the blocks, at the least.
+/// Minimum side of the blocks in pixels.
 const LEAST_BLOCK: usize = 4;
-/// Blocks along the longer side of a frame.
+/// Number of blocks along the longer side of a frame.
 const BLOCKS: usize = 32;
-/// Exposures beyond these shares of the reference's are outside of what a calibration covers: its
-/// polynomial is for differences of some levels, and clipping begins.
+/// Range of exposures, relative to the reference, that a calibration covers: its polynomial is for
+/// differences of several levels, and clipping begins outside the range.
 const EXPOSURES: [f64; 2] = [0.8, 1.25];
-/// Channels whose ratios differ by more from their median have another white balance. A large contact
-/// tints the border of real frames by up to 0.12.
+/// Deviation of a channel's ratio from the median above which the white balance differs. A large
+/// contact tints the border of real frames by up to 0.12.
 const BALANCE: f64 = 0.13;
-/// Difference of the border's untouched part from the reference, as a share of its level, beyond which
-/// the light is another. Frames of one sensor under the deepest contacts have 0.014 at most, those of two
-/// units 0.06 and more (`--example exact_worlds`).
+/// Relative difference of the border's untouched part from the reference above which the light
+/// differs. For frames of one sensor under the deepest contacts it is at most 0.014, for those of
+/// two units 0.06 or more (`--example exact_worlds`).
 const PATTERN: f64 = 0.03;
-/// Share of the border that the widest contact leaves untouched.
+/// Minimum fraction of the border that remains untouched by a wide contact.
 const UNTOUCHED: f64 = 0.3;
-/// A transformed frame is named if it fits by less than this share of the misfit as it came.
+/// A transformed frame is reported if its misfit is below this fraction of the original misfit.
 const FITS_BETTER: f64 = 0.45;
-/// Below this level a frame is black, above 255 less it is white.
+/// A frame is black below this level, and white above 255 minus this level.
 const DARK: f64 = 6.0;
-/// A frame whose neighbouring pixels differ by this many times as much as the reference's is noise.
+/// A frame is noise if its neighbouring pixels differ by this multiple of those of the reference.
 const NOISY: f64 = 12.0;
 
-/// How a frame was turned or mirrored.
+/// Rotation or reflection of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum Turn {
-    /// By half a turn.
+    /// Rotated by 180°.
     Half,
     /// Left and right are exchanged.
     LeftRight,
     /// Top and bottom are exchanged.
     TopBottom,
-    /// Rows and columns are exchanged, or a quarter turn.
+    /// Rows and columns are exchanged, or the frame is rotated by 90°.
     Quarter,
 }
 
-/// Why a frame is not, or may not be, this sensor's as it was calibrated.
+/// Why a frame does not, or may not, come from this sensor as calibrated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
@@ -57,30 +58,31 @@ pub enum FrameDoubt {
     Black,
     /// Nearly all of the frame is white.
     White,
-    /// Neighbouring pixels have nothing in common.
+    /// Neighbouring pixels are uncorrelated.
     Noise,
-    /// The exposure is this many times the reference's.
+    /// The exposure differs from that of the reference by this factor.
     Exposure(f64),
-    /// The channels are these many times as bright, beside a common factor.
+    /// The brightness of the channels differs by these factors, relative to a common one.
     Balance([f64; 3]),
-    /// Channels are exchanged: the frame's channels, 0 to 2, that red, green and blue are found in.
+    /// Channels are exchanged: indices, 0 to 2, of the frame's channels that hold red, green and
+    /// blue.
     ChannelsExchanged([usize; 3]),
-    /// The frame is turned or mirrored.
+    /// The frame is rotated or mirrored.
     Turned(Turn),
-    /// The light has another pattern: another unit, a lamp or the gel has changed. The difference along
-    /// the untouched border as a share of the reference's level.
+    /// The light has another pattern: it is another unit, or a lamp or the gel has changed. The
+    /// value is the difference along the untouched border, relative to the level of the reference.
     AnotherPattern(f64),
-    /// The slopes belong to no face that is pressed in.
+    /// The slopes do not belong to a face that is pressed in.
     NoSurface,
 }
 
 impl FrameDoubt {
-    /// Whether nothing can be read from the frame.
+    /// Whether the frame cannot be used at all.
     pub fn refuses(&self) -> bool {
         !matches!(self, Self::Exposure(_) | Self::Balance(_) | Self::NoSurface)
     }
 
-    /// A word that programs recognise it by.
+    /// A keyword for programs.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Black => "black_frame",
@@ -144,14 +146,14 @@ impl core::fmt::Display for FrameDoubt {
     }
 }
 
-/// What the border shows: factors of the channels, and doubts.
+/// Result for the border: factors of the channels, and doubts.
 pub(crate) struct FrameLight {
-    /// Factor of the exposure, common to all channels.
+    /// Exposure factor common to all channels.
     pub gain: f64,
     pub doubts: Vec<FrameDoubt>,
 }
 
-/// Block means of one image, and how much neighbouring pixels differ.
+/// Block means of one image, and the differences between neighbouring pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Blocks {
     means: Array3<f32>,
@@ -193,7 +195,8 @@ impl Blocks {
         }
     }
 
-    /// Levels of the blocks along the border, for channels in this order, of the image turned so.
+    /// Levels of the blocks along the border, with channels in this order, of the image transformed
+    /// by `turn`.
     fn border(&self, order: [usize; 3], turn: Option<Turn>) -> Option<Vec<[f64; 3]>> {
         let (high, wide, _) = self.means.dim();
         if turn == Some(Turn::Quarter) && high != wide {
@@ -220,7 +223,7 @@ impl Blocks {
     }
 }
 
-/// Ratios of the channels between two borders, each a median.
+/// Ratios of the channels between two borders, as medians.
 fn ratios(frame: &[[f64; 3]], reference: &[[f64; 3]]) -> [f64; 3] {
     [0, 1, 2].map(|k| {
         let pairs = frame.iter().zip(reference);
@@ -229,8 +232,8 @@ fn ratios(frame: &[[f64; 3]], reference: &[[f64; 3]]) -> [f64; 3] {
     })
 }
 
-/// Misfit of a border times `gains`, as a share of the reference's level, that this share of it has at
-/// the most.
+/// Quantile of the border's misfit after multiplication by `gains`, relative to the level of the
+/// reference.
 fn misfit(frame: &[[f64; 3]], reference: &[[f64; 3]], gains: [f64; 3], share: f64) -> f64 {
     let pairs = frame.iter().zip(reference);
     let each = pairs.map(|(f, r)| {
@@ -266,7 +269,7 @@ pub(crate) fn light(frame: &Blocks, reference: &Blocks) -> FrameLight {
     };
     let channels = ratios(&own, &flat);
     let gain = median(&mut channels.to_vec());
-    // With a common factor: exchanged channels would hide in factors of their own.
+    // A common factor is used, because separate factors would hide exchanged channels.
     let common = |frame: &[[f64; 3]]| {
         let gain = median(&mut ratios(frame, &flat).to_vec());
         misfit(frame, &flat, [gain; 3], 0.5)
@@ -300,8 +303,8 @@ pub(crate) fn light(frame: &Blocks, reference: &Blocks) -> FrameLight {
     } else if !(EXPOSURES[0]..=EXPOSURES[1]).contains(&gain) {
         doubts.push(FrameDoubt::Exposure(gain));
     }
-    // Small steps of the channels that do not agree are contacts at the border or lamps, not the
-    // exposure.
+    // If small changes of the channels disagree, they come from contacts at the border or from
+    // lamps, not from the exposure.
     let agree = channels
         .iter()
         .all(|ratio| (ratio - gain).abs() < 0.5 * (gain - 1.0).abs());

@@ -1,28 +1,28 @@
-//! Forces for those who have a gauge alone: readings under which frames were taken.
+//! Forces calibrated with a gauge alone, from its readings under a set of frames.
 //!
-//! Neither layer nor modulus is known. The volume V that the face gives way by is the integral of its
-//! displacement over the contacts. Of bodies of one shape on one gel the force follows F = c Vᵐ: with
-//! m = 3/5 for a ball on a half-space by Hertz's law, 1 for a flat punch. Exponent and factor are those
-//! of a line through ln V and ln F.
+//! Neither the layer nor its modulus needs to be known. The volume V displaced by the face is the
+//! integral of its displacement over the contacts. For bodies of one shape on one gel the force
+//! follows F = c Vᵐ: m = 3/5 for a ball on a half-space by Hertz's law, 1 for a flat punch.
+//! Exponent and factor come from a line through ln V and ln F.
 
 use tactile_core::{Estimate, Requirement};
 
 use crate::{GelError, GelFrame};
 
-/// The line has two numbers, and its scatter needs some more.
+/// Minimum number of readings: the line has two parameters, and its scatter needs several more.
 const LEAST_READINGS: usize = 4;
-/// Forces beyond the readings by this factor follow a law that was not seen there.
+/// Factor outside the range of readings above which forces are extrapolated too far.
 const BEYOND: f64 = 1.5;
 
-/// Normal forces by a line from the volume of the contacts, for bodies of the shape that it was fitted
-/// with.
+/// Normal forces from the volume of the contacts by a fitted line, for bodies of the shape used for
+/// the fit.
 ///
 /// ```
 /// # use ndarray::Array2;
 /// # use tactile_gel::{GelModel, GelSensor};
 /// # use tactile_gel::GelError;
 /// use tactile_gel::GaugeForce;
-/// // Volumes in cubic metres and what the gauge read in newtons.
+/// // Volumes in cubic metres and gauge readings in newtons.
 /// let readings = [(1e-10, 0.1), (2e-10, 0.155), (4e-10, 0.228), (8e-10, 0.352), (16e-10, 0.528)];
 /// let law = GaugeForce::of_volumes(&readings)?;
 /// assert!((law.exponent() - 0.6).abs() < 0.01);
@@ -40,7 +40,7 @@ pub struct GaugeForce {
     /// Means of ln V and ln F, and the slope.
     mean: [f64; 2],
     exponent: f64,
-    /// Sum of squares of ln V about its mean, and the residual variance of ln F.
+    /// Sum of squares of ln V about its mean, and residual variance of ln F.
     spread: f64,
     variance: f64,
     count: f64,
@@ -48,11 +48,12 @@ pub struct GaugeForce {
 }
 
 impl GaugeForce {
-    /// From frames and what the gauge read under them in newtons. O(n) for n frames.
+    /// Fits the line to frames and gauge readings in newtons. O(n) for n frames.
     ///
     /// # Errors
-    /// [`GelError::NoContact`] for a frame without contact, [`GelError::SeveralContacts`] for one whose
-    /// force is shared, and those of [`of_volumes`](Self::of_volumes).
+    /// [`GelError::NoContact`] for a frame without contact, [`GelError::SeveralContacts`] for a
+    /// frame with several, whose force is shared, and the errors of
+    /// [`of_volumes`](Self::of_volumes).
     pub fn fit(readings: &[(&GelFrame, f64)]) -> Result<Self, GelError> {
         let volumes = readings
             .iter()
@@ -64,11 +65,12 @@ impl GaugeForce {
         Self::of_volumes(&volumes.collect::<Result<Vec<_>, GelError>>()?)
     }
 
-    /// From volumes in cubic metres and readings in newtons.
+    /// Fits the line to volumes in cubic metres and readings in newtons.
     ///
     /// # Errors
-    /// [`GelError::TooFewPresses`] below four, [`GelError::InvalidOption`] for one that is not
-    /// positive, [`GelError::NoSolution`] if all volumes are one, or the force does not grow.
+    /// [`GelError::TooFewPresses`] for fewer than four, [`GelError::InvalidOption`] for a value
+    /// that is not positive, [`GelError::NoSolution`] if all volumes are equal or the force does
+    /// not increase with the volume.
     pub fn of_volumes(readings: &[(f64, f64)]) -> Result<Self, GelError> {
         if readings.len() < LEAST_READINGS {
             return Err(GelError::TooFewPresses {
@@ -104,7 +106,7 @@ impl GaugeForce {
         })
     }
 
-    /// Standard deviation of the readings about the line, as a share of the force.
+    /// Relative standard deviation of the readings about the line.
     pub fn scatter(&self) -> f64 {
         self.variance.sqrt()
     }
@@ -114,7 +116,7 @@ impl GaugeForce {
         self.exponent
     }
 
-    /// The normal force of each contact in newtons, as of a body of that shape.
+    /// The normal force of each contact in newtons, for a body of that shape.
     pub fn forces(&self, frame: &GelFrame) -> Vec<Estimate> {
         let volumes = frame.volumes_m3().into_iter();
         volumes.map(|volume| self.at_volume(volume)).collect()
@@ -122,8 +124,8 @@ impl GaugeForce {
 
     /// The force in newtons under a volume in cubic metres.
     ///
-    /// The error is that of one more reading: the scatter of the readings, and that of the line. It
-    /// is infinite for volumes beyond those of the readings by half of them.
+    /// The error is that of one more reading: the scatter of the readings plus the error of the
+    /// line. It is infinite for volumes outside the range of the readings by more than half.
     pub fn at_volume(&self, volume_m3: f64) -> Estimate {
         let away = volume_m3.ln() - self.mean[0];
         let force = (self.mean[1] + self.exponent * away).exp();
@@ -140,7 +142,7 @@ impl GaugeForce {
 }
 
 impl GelFrame {
-    /// The volume in cubic metres that each contact takes from the gel, below the gel far away.
+    /// The volume in cubic metres displaced by each contact, below the level of the gel far away.
     pub fn volumes_m3(&self) -> Vec<f64> {
         let mut sums = vec![(0.0, 0.0); self.contacts.len()];
         for (depth, label) in self.depth_m.iter().zip(&self.labels) {
@@ -158,7 +160,7 @@ impl GelFrame {
     }
 }
 
-/// The numbers of a [`GaugeForce`] as files keep them.
+/// The parameters of a [`GaugeForce`] in the file format.
 #[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -197,7 +199,7 @@ impl TryFrom<GaugeNumbers> for GaugeForce {
         Requirement::Positive.check("exponent", of.exponent)?;
         Requirement::Positive.check("log_volume_spread", of.log_volume_spread)?;
         Requirement::NonNegative.check("log_force_variance", of.log_force_variance)?;
-        // Two numbers of the line are fitted.
+        // The line has two fitted parameters.
         Requirement::Positive.check("readings - 2", of.readings - 2.0)?;
         for volume in of.volumes_m3 {
             Requirement::Positive.check("volumes_m3", volume)?;

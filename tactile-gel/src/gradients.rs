@@ -1,4 +1,4 @@
-//! Colour differences against the reference, and the polynomial from them to normals.
+//! Colour differences from the reference, and the polynomial that maps them to normals.
 
 use ndarray::{Array2, ArrayView2, ArrayView3, Axis};
 use tactile_core::vectorised;
@@ -6,20 +6,20 @@ use tactile_core::vectorised;
 /// Monomials up to the third degree of three colour differences.
 const MONOMIALS: usize = 20;
 
-/// Coefficients of one component of the normal: every monomial times 1, x and y.
+/// Number of coefficients of one component of the normal: each monomial times 1, x and y.
 pub(crate) const TERMS: usize = 3 * MONOMIALS;
 
-/// Columns that are computed together, so that the compiler uses wide instructions.
+/// Number of columns computed together, so that the compiler uses SIMD instructions.
 const LANES: usize = 16;
 
-/// Samples of the border, at the most, that a median is taken of. More hardly change it.
+/// Maximum number of border samples for a median. More samples hardly change it.
 const BORDER_SAMPLES: usize = 6400;
 
-/// An 8-bit colour image blurred by the binomial kernel (1, 4, 6, 4, 1)/16 along both axes, channel
-/// by channel.
+/// An 8-bit colour image, blurred by the binomial kernel (1, 4, 6, 4, 1)/16 along both axes in each
+/// channel.
 ///
-/// The kernel has a standard deviation of one pixel. Samples are kept as whole numbers of 1/256
-/// grey level, which 16 bits hold exactly. The border is continued by its last pixel.
+/// The kernel has a standard deviation of one pixel. Samples are stored as integers of 1/256 grey
+/// level, which fit exactly in 16 bits. The border is extended by its last pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Blurred {
     rows: usize,
@@ -31,7 +31,7 @@ impl Blurred {
     pub(crate) fn of(image: ArrayView3<'_, u8>) -> Self {
         let (rows, columns, _) = image.dim();
         let mut channels = [(); 3].map(|()| vec![0_u16; rows * columns]);
-        // Rows that are blurred along themselves: five are needed at a time.
+        // Rows blurred along themselves. Five are needed at a time.
         let mut ring = [(); 5].map(|()| [(); 3].map(|()| vec![0_u16; columns]));
         let mut lines = [(); 3].map(|()| vec![0_u16; columns + 4]);
         let mut ready = 0;
@@ -63,31 +63,32 @@ impl Blurred {
         (self.rows, self.columns)
     }
 
-    /// A row of a channel, in 1/256 grey level.
+    /// A row of a channel, in units of 1/256 grey level.
     pub(crate) fn line(&self, channel: usize, row: usize) -> &[u16] {
         &self.channels[channel][row * self.columns..][..self.columns]
     }
 
-    /// The image at a `gain`-th of its exposure.
+    /// The image with its exposure divided by `gain`.
     pub(crate) fn divided_by(mut self, gain: f64) -> Self {
         if gain != 1.0 {
             let factor = (1.0 / gain) as f32;
             for sample in self.channels.iter_mut().flatten() {
-                // Levels above 255 are beyond those that calibrations see.
+                // Levels above 255 are outside the range of calibrations.
                 *sample = (f32::from(*sample) * factor).round().min(65535.0) as u16;
             }
         }
         self
     }
 
-    /// Median difference to `reference` of each channel over the frame's border, in grey levels.
+    /// Median difference of each channel from `reference` over the border of the frame, in grey
+    /// levels.
     ///
     /// Lamps and exposure change between frames. The border is the part that is touched least, and
-    /// a median bears a contact that reaches it.
+    /// a median tolerates a contact that reaches it.
     fn offset(&self, reference: &Self) -> [f32; 3] {
-        // A strip of a thirteenth and a sixteenth at each side is a quarter of the pixels.
+        // Strips of a thirteenth and a sixteenth on each side contain a quarter of the pixels.
         let (high, wide) = (self.rows.div_ceil(13), self.columns.div_ceil(16));
-        // Every third pixel is enough for a median, of large frames fewer.
+        // Every third pixel is enough for a median; for large frames fewer.
         let step = (self.rows * self.columns / (4 * BORDER_SAMPLES)).max(3);
         [0, 1, 2].map(|channel| {
             let mut differences = Vec::new();
@@ -108,7 +109,7 @@ impl Blurred {
         })
     }
 
-    /// Differences to `reference` less the offset, in units of 50 grey levels, for one row.
+    /// Differences from `reference` minus the offset, in units of 50 grey levels, for one row.
     #[inline(always)]
     fn differences(&self, reference: &Self, offset: [f32; 3], row: usize, out: &mut [Vec<f32>; 3]) {
         for (channel, out) in out.iter_mut().enumerate() {
@@ -121,7 +122,7 @@ impl Blurred {
     }
 }
 
-/// The channels of a row, with room for two samples before them and after them.
+/// The channels of a row, with space for two samples on either side.
 fn parted(row: ArrayView2<'_, u8>, lines: &mut [Vec<u16>; 3]) {
     let [a, b, c] = lines.each_mut().map(|line| &mut line[2..]);
     let places = a.iter_mut().zip(b).zip(c);
@@ -136,8 +137,8 @@ fn parted(row: ArrayView2<'_, u8>, lines: &mut [Vec<u16>; 3]) {
     }
 }
 
-/// The sum with weights 1, 4, 6, 4, 1. It is not divided by 16: of whole numbers it is exact, and of
-/// two passes over 8-bit samples at most 255 · 256.
+/// The sum with weights 1, 4, 6, 4, 1, without the division by 16. It is exact for integers, and
+/// two passes over 8-bit samples give at most 255 · 256.
 fn binomial(taps: [&[u16]; 5], out: &mut [u16]) {
     let [a, b, c, d, e] = taps.map(|tap| &tap[..out.len()]);
     vectorised(
@@ -150,7 +151,7 @@ fn binomial(taps: [&[u16]; 5], out: &mut [u16]) {
     );
 }
 
-/// All monomials of one pixel's differences, from 1 to the third degree.
+/// All monomials of one pixel's differences, from 1 to third degree.
 #[inline(always)]
 fn monomials([r, g, b]: [f32; 3]) -> [f32; MONOMIALS] {
     let (rr, rg, rb, gg, gb, bb) = (r * r, r * g, r * b, g * g, g * b, b * b);
@@ -187,13 +188,13 @@ fn terms(differences: [f32; 3], [x, y]: [f32; 2]) -> [f64; TERMS] {
     })
 }
 
-/// A pixel's place from −1 to 1 along both axes.
+/// Position of a pixel, from −1 to 1 along both axes.
 fn place(row: usize, column: usize, (rows, columns): (usize, usize)) -> [f32; 2] {
     let along = |k: usize, n: usize| (2.0 * k as f32 + 1.0) / n as f32 - 1.0;
     [along(column, columns), along(row, rows)]
 }
 
-/// Terms of the polynomial at the pixels that `wanted` takes, each given to `each`.
+/// Calls `each` with the terms of the polynomial at each pixel for which `wanted` is true.
 pub(crate) fn samples(
     frame: &Blurred,
     reference: &Blurred,
@@ -212,7 +213,7 @@ pub(crate) fn samples(
     }
 }
 
-/// The components n_x and n_y of the unit normal at every pixel.
+/// The components n_x and n_y of the unit normal at each pixel.
 pub(crate) fn normals(
     frame: &Blurred,
     reference: &Blurred,
@@ -231,7 +232,7 @@ pub(crate) fn normals(
             for row in 0..rows {
                 frame.differences(reference, offset, row, &mut line);
                 let [_, y] = place(row, 0, (rows, columns));
-                // Along a row the coefficient of a monomial is a + b x.
+                // Along a row, the coefficient of a monomial is a + b x.
                 let fixed: [[f32; MONOMIALS]; 2] = core::array::from_fn(|component| {
                     core::array::from_fn(|k| {
                         weight(component, k) + y * weight(component, k + 2 * MONOMIALS)

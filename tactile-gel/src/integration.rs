@@ -1,29 +1,30 @@
-//! Slopes to depth, each slope by what it is worth.
+//! Integration of slopes to depth, with each slope weighted by its accuracy.
 //!
-//! The colours give normals whose errors are alike everywhere. Slopes are their tangents: at a slope s
-//! the error is (1 + s²)^(3/2) times as large along it, and √(1 + s²) across. Poisson's equation takes
-//! all slopes for equally good, so that what is wrong on the steep rim of a ball tilts its whole cap.
-//! The depth z minimises Σ w_x (∂z/∂x − p)² + w_y (∂z/∂y − q)² with the inverse variances w. Where no
-//! slope is steep this is Poisson's equation, whose solution is the start. What is added to it is
-//! smooth, and is found on a coarse grid.
+//! The colours give normals with equal errors everywhere. Slopes are their tangents: at a slope s
+//! the error is (1 + s²)^(3/2) times as large along the slope, and √(1 + s²) times across.
+//! Poisson's equation weights all slopes equally, so an error on the steep rim of a ball tilts its
+//! whole cap. Here the depth z minimises Σ w_x (∂z/∂x − p)² + w_y (∂z/∂y − q)² with the inverse
+//! variances w. Without steep slopes this is Poisson's equation, whose solution is the start. The
+//! correction to it is smooth, and is computed on a coarse grid.
 
 use ndarray::Array2;
 use tactile_sfs::{CosinePoisson, Domain, SlopeIntegrator};
 
 use crate::GelError;
 
-/// Blocks along the longer side of the grid that the added depth is found on. Twice as many change the
-/// heights of real balls by less than a hundredth of their error.
+/// Blocks along the longer side of the grid for the correction. Twice as many change the heights of
+/// real balls by less than a hundredth of their error.
 const BLOCKS: usize = 24;
-/// Frames of fewer cells are solved for pixel by pixel.
+/// Frames with fewer cells are solved pixel by pixel.
 const LEAST_CELLS: usize = 8;
-/// Rounds of conjugate gradients at most, and the share of the residual at which they end.
+/// Maximum number of conjugate-gradient iterations, and the relative residual at which they stop.
 const ROUNDS: usize = 60;
 const ENOUGH: f64 = 1e-3;
 
-/// Depth in the unit of `size`, that of a pixel, up to a constant. `means` are the slopes on cells of
-/// 2 × 2 pixels, half of the frame's size. The blur of the frames is wider than a cell: depth is solved
-/// for on cells, and goes on from their middles to the pixels by the slopes of both.
+/// Depth in units of `size`, the size of a pixel, up to a constant. `means` are the slopes on cells
+/// of 2 × 2 pixels, half the size of the frame. The blur of the frames is wider than a cell, so
+/// depth is solved on cells and extrapolated from their centres to the pixels with the slopes of
+/// both.
 pub(crate) fn integrated(
     slopes: [&Array2<f32>; 2],
     means: [&Array2<f32>; 2],
@@ -37,7 +38,7 @@ pub(crate) fn integrated(
     let (high, wide) = cells.dim();
     let mut depth = Array2::zeros(shape);
     for (row, mut line) in depth.outer_iter_mut().enumerate() {
-        // Odd last rows and columns go on from the last cells.
+        // The last rows and columns of odd sizes are extrapolated from the last cells.
         let r = (row / 2).min(high - 1);
         let down = 0.5 * size * (row as f64 - 2.0 * r as f64 - 0.5);
         let (cells, [p, q]) = (cells.row(r), means.map(|mean| mean.row(r)));
@@ -55,7 +56,7 @@ pub(crate) fn integrated(
     Ok(depth)
 }
 
-/// Depth of slopes on a grid, each by what it is worth.
+/// Depth from slopes on a grid, weighted by their accuracy.
 fn solved(slopes: [&Array2<f32>; 2], size: f64) -> Result<Array2<f64>, GelError> {
     let [p, q] = slopes.map(|slope| slope.mapv(f64::from));
     let domain = Domain::new([size; 2])?;
@@ -71,9 +72,9 @@ fn solved(slopes: [&Array2<f32>; 2], size: f64) -> Result<Array2<f64>, GelError>
     Ok(depth)
 }
 
-/// The weighted fit on blocks: what the edges between neighbours weigh, and the rises that are left
-/// along them. Row after row, the edge to the right and the one downwards of every block. Those at
-/// the border weigh nothing.
+/// The weighted fit on blocks: weights of the edges between neighbours, and the remaining rises
+/// along them. Row by row, each block has the edge to its right and the one below. Edges at the
+/// border have weight zero.
 struct Coarse {
     shape: (usize, usize),
     weights: [Vec<f64>; 2],
@@ -94,7 +95,8 @@ impl Coarse {
                     let [p, q] = [p, q].map(|slope| f64::from(slope[column]));
                     let x = p - (here[column + 1] - here[column - 1]) / (2.0 * size);
                     let y = q - (below[column] - above[column]) / (2.0 * size);
-                    // The derivative of n/n_z by n is (1 + n nᵀ/n_z²)/n_z, and n/n_z are the slopes.
+                    // The derivative of n/n_z by n is (1 + n nᵀ/n_z²)/n_z, and n/n_z are the
+                    // slopes.
                     let up2 = 1.0 / (1.0 + p * p + q * q);
                     let across = (p * q).powi(2);
                     let [wx, wy] = [p, q].map(|s| up2 / ((1.0 + s * s).powi(2) + across));
@@ -130,7 +132,7 @@ impl Coarse {
         }
     }
 
-    /// Sums over each block of what flows in along its edges: weight times rise.
+    /// Sums over each block of the inflow along its edges: weight times rise.
     fn inflow(&self, rise: impl Fn(usize, usize, usize) -> f64, sums: &mut [f64]) {
         sums.fill(0.0);
         for (axis, ahead) in [1, self.shape.1].into_iter().enumerate() {
@@ -143,7 +145,7 @@ impl Coarse {
         }
     }
 
-    /// Conjugate gradients, with the diagonal as preconditioner.
+    /// Conjugate gradients with a diagonal preconditioner.
     fn depth(&self) -> Array2<f64> {
         let count = self.shape.0 * self.shape.1;
         let [mut left, mut moved, mut diagonal] = [(); 3].map(|()| vec![0.0; count]);
@@ -186,7 +188,7 @@ impl Coarse {
     }
 }
 
-/// Adds values of blocks to their pixels, linearly between the blocks' middles.
+/// Adds values of blocks to their pixels, interpolated linearly between the centres of the blocks.
 fn add_between(depth: &mut Array2<f64>, blocks: &Array2<f64>, block: usize) {
     let split = |k: usize, n: usize| {
         let at = ((k as f64 + 0.5) / block as f64 - 0.5).clamp(0.0, (n - 1) as f64);

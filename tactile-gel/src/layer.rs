@@ -1,9 +1,9 @@
-//! The gel's layer on its plate.
+//! The layer of gel on its plate.
 
 use tactile_elasticity::ElasticityError;
 use tactile_elasticity::contact::{Layer, Waveguide};
 
-/// The layer of gel on its rigid plate, as the files of a sensor name it in `[gel]`.
+/// The layer of gel on its rigid plate, with the names used in `[gel]` of sensor files.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
@@ -15,13 +15,13 @@ pub struct GelLayer {
     pub poisson_ratio: f64,
     /// Young's modulus in pascals.
     pub youngs_modulus_pa: f64,
-    /// Its standard error in pascals.
+    /// Standard error of Young's modulus in pascals.
     pub youngs_modulus_error_pa: f64,
 }
 
 impl GelLayer {
-    /// A layer of this thickness in metres, Poisson's ratio, Young's modulus and its standard error
-    /// in pascals.
+    /// Creates a layer from its thickness in metres, Poisson's ratio, and Young's modulus with its
+    /// standard error in pascals.
     pub fn new(thickness_m: f64, poisson_ratio: f64, youngs_modulus_pa: [f64; 2]) -> Self {
         let [youngs_modulus_pa, youngs_modulus_error_pa] = youngs_modulus_pa;
         Self {
@@ -32,13 +32,13 @@ impl GelLayer {
         }
     }
 
-    /// Of silicones, which hardly yield in volume.
+    /// Default Poisson ratio, that of silicones, which are nearly incompressible.
     pub const DEFAULT_POISSON_RATIO: f64 = 0.48;
 
-    /// The layer as the contact laws take it.
+    /// The layer in the form used by the contact laws.
     ///
     /// # Errors
-    /// [`ElasticityError`] for a layer without thickness, modulus or a Poisson ratio.
+    /// [`ElasticityError`] for a layer with an invalid thickness, modulus or Poisson ratio.
     pub fn guide(&self) -> Result<Waveguide, ElasticityError> {
         Waveguide::new(vec![Layer {
             thickness_m: self.thickness_m,

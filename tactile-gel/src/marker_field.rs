@@ -1,5 +1,5 @@
-//! Markers followed from the reference through frames: how the face moves sideways, the shear force
-//! and the torque that this takes, and what slips.
+//! Markers followed from the reference through frames: sideways motion of the face, the resulting
+//! shear force and torque, and slip.
 
 use nalgebra::{Matrix2, Point2, Rotation2, Vector2};
 use tactile_core::Estimate;
@@ -9,33 +9,34 @@ use tactile_tps::{LocalField, LocalValue, nearest_rows};
 
 use crate::markers::Marker;
 
-/// Fewer tracks do not show their own noise.
+/// Minimum number of tracks. Fewer do not reveal their own noise.
 const LEAST_TRACKS: usize = 4;
-/// A marker is where the field predicts it within this many standard errors, and within a third of
-/// the spacing: farther away a meeting is as likely by chance.
+/// A marker is accepted within this number of standard errors of the field's prediction, and within
+/// a third of the spacing: further away, a chance coincidence is equally likely.
 const PREDICTED: f64 = 4.0;
-/// A marker slips if it leaves the rigid motion by this many standard errors, and by this many
-/// pixels: the gel below the edge of a contact gives way a little.
+/// A marker slips if it deviates from the rigid motion by this number of standard errors and this
+/// number of pixels, because the gel below the edge of a contact deforms slightly.
 const SLIP_ERRORS: f64 = 4.0;
 const LEAST_SLIP_PX: f64 = 0.3;
-/// Seen markers about one that is hidden, by which the field in the gap is judged.
+/// Number of visible markers around a hidden one that assess the field in the gap.
 const BESIDE: usize = 4;
-/// Markers that rigid motions are tried of, each with every other.
+/// Maximum number of markers whose pairs are tried for a rigid motion.
 const TRIED: usize = 60;
 
-/// Where a marker of the reference went.
+/// Motion of a marker of the reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct MarkerTrack {
     /// Row of the marker in the reference.
     pub row: usize,
-    /// Its row in the frame. `None` if it is not seen: it moves as the markers around it do.
+    /// Row of the marker in the frame. `None` if it is hidden: it then moves like the markers
+    /// around it.
     pub seen_row: Option<usize>,
     /// Centre in the reference, in pixels.
     pub position_px: Point2<f64>,
     /// Displacement in pixels.
     pub displacement_px: Vector2<f64>,
-    /// Standard error of a coordinate of the position, and of the displacement.
+    /// Standard errors of a coordinate of the position and of the displacement.
     pub standard_errors_px: [f64; 2],
 }
 
@@ -44,7 +45,7 @@ impl MarkerTrack {
         self.position_px
     }
 
-    /// Where it is in the frame, in pixels.
+    /// Position in the frame, in pixels.
     pub fn place_px(&self) -> Point2<f64> {
         self.position_px + self.displacement_px
     }
@@ -55,7 +56,7 @@ impl MarkerTrack {
 /// ```
 /// use nalgebra::Point2;
 /// use tactile_gel::{Marker, MarkerField};
-/// // A grid moves by 1.5 of its steps along x, and nothing shows this but the frames on the way.
+/// // A grid moves by 1.5 steps along x, which only the intermediate frames reveal.
 /// let frame = |k: u32| -> Vec<_> {
 ///     let place = |i: u32| Point2::new(f64::from(10 * (i % 7) + k), f64::from(10 * (i / 7)));
 ///     (0..42).map(|i| Marker::new(place(i), 0.05, 60.0)).collect()
@@ -71,16 +72,16 @@ impl MarkerTrack {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct MarkerField {
-    /// A track for every marker of the reference.
+    /// One track per marker of the reference.
     pub tracks: Vec<MarkerTrack>,
-    /// Why the pairs may be wrong, by the matcher. `None` if nothing speaks against them.
+    /// The matcher's doubt about the pairs. `None` if it has none.
     pub doubt: Option<Doubt>,
-    /// Places in the last frame without a doubt.
+    /// Positions in the last frame without a doubt.
     known: Vec<Point2<f64>>,
     matcher: AnnealedSoftassign,
 }
 
-/// Shear force and torque, with the standard errors that the markers' give them.
+/// Shear force and torque, with standard errors from those of the markers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
@@ -89,32 +90,32 @@ pub struct MarkerShear {
     pub force_n: [Estimate; 2],
     /// M_z about the mean of the reference's markers, in newton metres.
     pub torque_nm: Estimate,
-    /// Column and row of that mean.
+    /// Column and row of the reference point of the torque, the mean of the reference's markers.
     pub about_px: [f64; 2],
 }
 
-/// How many markers of a contact have left its rigid motion.
+/// Number of markers of a contact that deviate from its rigid motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct MarkerSlip {
-    /// Markers that the contact covers in both frames.
+    /// Number of markers inside the contact in both frames.
     pub markers: usize,
-    /// Share of them that slip.
+    /// Fraction of these markers that slip.
     pub share: f64,
-    /// Rigid motion of those that stick: of the markers' middle along x and y, in pixels.
+    /// Rigid motion of the sticking markers: translation of their centre along x and y, in pixels.
     pub motion_px: [f64; 2],
-    /// Its turn in radians.
+    /// Rotation of the rigid motion in radians.
     pub turn_rad: f64,
 }
 
-/// Follows markers from the reference to a frame: no order and no grid is assumed, markers may be
+/// Follows markers from the reference to a frame. No order or grid is assumed, and markers may be
 /// missing in either.
 ///
-/// [`AnnealedSoftassign`] pairs them. Markers on a lattice that has moved by more than a sixth of its
-/// step have a [`doubt`](MarkerField::doubt): the lattice may have moved by another step as well.
-/// [`MarkerField::followed`] from frame to frame has none, and a
-/// [largest motion](MarkerField::with_largest_motion_px) takes it away.
+/// [`AnnealedSoftassign`] pairs the markers. If markers on a lattice have moved by more than a
+/// sixth of its step, there is a [`doubt`](MarkerField::doubt), because a shift by another step
+/// would fit as well. Following them from frame to frame ([`MarkerField::followed`]) avoids the
+/// doubt, and so does a [largest motion](MarkerField::with_largest_motion_px).
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -126,25 +127,25 @@ pub struct MarkerSlip {
 ///     )
 /// };
 /// let reference: Vec<_> = (0..42).map(|k| Marker::new(place(k), 0.05, 60.0)).collect();
-/// // Sheared by 10 %, the last markers hidden.
+/// // Sheared by 10 %, with the last markers hidden.
 /// let sheared = |p: Point2<f64>| Point2::new(p.x + 0.1 * p.y, p.y);
 /// let frame: Vec<_> = (0..38).map(|k| Marker::new(sheared(place(k)), 0.05, 60.0)).collect();
 /// let field = track_markers(&reference, &frame)?;
 /// assert_eq!(field.seen().count(), 38);
 /// assert!(field.seen().all(|track| track.seen_row == Some(track.row)));
-/// // The hidden ones go where the others do.
+/// // The hidden markers follow the others.
 /// assert!((field.tracks[41].displacement_px.x - 0.1 * place(41).y).abs() < 0.05);
 /// # Ok::<(), tactile_gel::GelError>(())
 /// ```
 ///
 /// # Errors
-/// Those of the matcher: too few markers.
+/// Those of the matcher, such as too few markers.
 pub fn track_markers(reference: &[Marker], frame: &[Marker]) -> Result<MarkerField, MatchError> {
     MarkerField::at_rest(reference).followed(frame)
 }
 
 impl MarkerField {
-    /// The markers of a reference, none of which has moved.
+    /// The markers of a reference, all without motion.
     pub fn at_rest(reference: &[Marker]) -> Self {
         let track = |(row, marker): (usize, &Marker)| MarkerTrack {
             row,
@@ -161,25 +162,25 @@ impl MarkerField {
         }
     }
 
-    /// With the largest motion of a marker from a frame to the next, in pixels.
+    /// Sets the largest motion of a marker from one frame to the next, in pixels.
     ///
     /// # Errors
-    /// [`MatchError`] for one that is not positive.
+    /// [`MatchError`] for a motion that is not positive.
     pub fn with_largest_motion_px(mut self, motion: f64) -> Result<Self, MatchError> {
         self.matcher = self.matcher.with_largest_motion(motion)?;
         Ok(self)
     }
 
-    /// The same markers in the next frame. The matcher starts from where they were last seen
-    /// without a doubt.
+    /// Follows the markers to the next frame. The matcher starts from their last positions without
+    /// a doubt.
     ///
     /// # Errors
-    /// Those of the matcher: too few markers.
+    /// Those of the matcher, such as too few markers.
     pub fn followed(&self, frame: &[Marker]) -> Result<Self, MatchError> {
         let there: Vec<_> = frame.iter().map(|marker| marker.position_px).collect();
         let mut matching = self.matcher.match_points(&self.known, &there)?;
         if matching.report.doubt().is_some() {
-            // Stills of presses of their own start at rest.
+            // Separate still frames start at rest.
             let rest: Vec<_> = self.tracks.iter().map(|track| track.position_px).collect();
             let other = self.matcher.match_points(&rest, &there)?;
             if other.report.doubt().is_none() {
@@ -199,8 +200,8 @@ impl MarkerField {
         })
     }
 
-    /// The tracks of all markers. Where one has no partner the field through the others leaves out
-    /// pairs that contradict it, finds markers where it predicts them, and moves the rest.
+    /// The tracks of all markers. If a marker has no partner, the field through the others rejects
+    /// contradicting pairs, finds markers at predicted positions, and moves the rest.
     fn tracks_to(&self, mut partners: Vec<Option<usize>>, frame: &[Marker]) -> Vec<MarkerTrack> {
         let tracks = |partners: &[Option<usize>], values: &[LocalValue<2>]| -> Vec<MarkerTrack> {
             let pairs = self.tracks.iter().zip(partners);
@@ -254,12 +255,12 @@ impl MarkerField {
         tracks
     }
 
-    /// The tracks of the markers that the frame shows.
+    /// The tracks of the visible markers.
     pub fn seen(&self) -> impl Iterator<Item = &MarkerTrack> {
         self.tracks.iter().filter(|track| track.seen_row.is_some())
     }
 
-    /// The largest displacement of a marker that is seen, in pixels. `None` without any.
+    /// The largest displacement of a visible marker, in pixels. `None` if no marker is visible.
     pub fn largest_px(&self) -> Option<Estimate> {
         let lengths = self
             .seen()
@@ -267,11 +268,11 @@ impl MarkerField {
         lengths.max_by(|a, b| a.value.total_cmp(&b.value))
     }
 
-    /// Mean Green–Lagrange strain of the face, E_xx, E_yy and E_xy. `None` below four markers that
-    /// are seen, and where they lie on a line.
+    /// Mean Green–Lagrange strain of the face, E_xx, E_yy and E_xy. `None` for fewer than four
+    /// visible markers, and if they lie on a line.
     ///
-    /// The mean gradient H of the field through the markers gives E = (H + Hᵀ + HᵀH)/2, and its
-    /// covariance the error to first order.
+    /// The strain is E = (H + Hᵀ + HᵀH)/2 for the mean gradient H of the field through the markers.
+    /// Its error follows from the covariance of H to first order.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -314,13 +315,14 @@ impl MarkerField {
             .then_some(parts)
     }
 
-    /// Shear force and torque of a gel whose surface resists displacement by k Pa per metre:
-    /// F = k A Σ u and M = k A Σ (r × u) over the cells of all markers of the reference, A the area
-    /// of a cell. Markers that are not seen move as those around them, with the error of that.
+    /// Shear force and torque of a gel whose surface resists displacement by k Pa per metre: F = k
+    /// A Σ u and M = k A Σ (r × u) over the cells of all markers of the reference, with the area A
+    /// of a cell. Hidden markers move like those around them, with a corresponding error.
     ///
-    /// A layer of shear modulus G and thickness h bonded to a rigid plate has k = G/h. Of the whole
-    /// face this holds for contacts of any width: the longest wave alone carries a force. Errors are
-    /// those of the markers, none of k. `None` without three markers that are not on a line.
+    /// A layer of shear modulus G and thickness h bonded to a rigid plate has k = G/h. For the
+    /// whole face this holds for contacts of any width, because only the longest wave carries a net
+    /// force. Errors are those of the markers, not of k. `None` without three markers that are not
+    /// on a line.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -331,7 +333,7 @@ impl MarkerField {
     ///         .map(|k| Marker::new(place(k) + nalgebra::Vector2::new(dx, 0.0), 0.05, 60.0))
     ///         .collect()
     /// };
-    /// // 36 cells of 1 mm² move by 0.1 mm on a layer of 1e8 Pa/m. A third of them is hidden.
+    /// // 36 cells of 1 mm² move by 0.1 mm on a layer of 1e8 Pa/m. A third of them are hidden.
     /// let field = track_markers(&all(0.0, 36), &all(1.0, 24))?;
     /// let shear = field.shear(1e8, 1e-4).expect("a grid");
     /// assert!((shear.force_n[0].value - 0.36).abs() < 1e-3 && shear.torque_nm.value.abs() < 1e-6);
@@ -342,7 +344,8 @@ impl MarkerField {
         let scale = stiffness_pa_per_m * cell_area(&places)? * pixel_size_m.powi(3);
         let mean = places.iter().map(|p| p.coords).sum::<Vector2<f64>>() / places.len() as f64;
         let (mut force, mut torque) = (Vector2::zeros(), 0.0);
-        // Variances of those seen, standard errors of those hidden: these share what is unknown.
+        // Variances of visible markers, and standard errors of hidden ones, whose errors are
+        // common.
         let (mut seen, mut hidden) = ([0.0; 2], [0.0; 2]);
         for track in &self.tracks {
             let (r, u) = (track.position_px.coords - mean, track.displacement_px);
@@ -366,13 +369,13 @@ impl MarkerField {
         })
     }
 
-    /// How many of the markers that a contact covers have left its rigid motion since an earlier
-    /// frame. `covers` holds for places, in pixels, inside of the contact.
+    /// Number of markers under a contact that have left its rigid motion since an earlier frame.
+    /// `covers` tells whether a position in pixels is inside the contact.
     ///
-    /// What sticks to a rigid body moves rigidly. The motion is that of most markers: if more than
-    /// half of them slip it is theirs, and a contact that slips as a whole shows no slip at all.
-    /// A marker slips if it is off by four standard errors and a third of a pixel. `None` for fewer
-    /// than four markers that are seen inside of the contact in both frames.
+    /// Markers that stick to a rigid body move rigidly. The motion is that of the majority: if more
+    /// than half of the markers slip, it is theirs, and a contact that slips as a whole shows no
+    /// slip. A marker slips if it deviates by four standard errors and a third of a pixel. `None`
+    /// for fewer than four visible markers inside the contact in both frames.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -435,7 +438,7 @@ impl MarkerTrack {
         }
     }
 
-    /// Moved as the field is there. Without one its motion is unknown.
+    /// Moves the marker with the local field. Without a field its motion is unknown.
     fn hidden(&self, value: Option<&LocalValue<2>>) -> Self {
         let moved = value.map(|value| (value.displacement, value.displacement_variance.sqrt()));
         let (displacement_px, error) = moved.unwrap_or((Vector2::zeros(), f64::INFINITY));
@@ -448,8 +451,8 @@ impl MarkerTrack {
     }
 }
 
-/// The field through the tracks that are seen, and whether each row agrees with it. `None` for few
-/// of them.
+/// The field through the visible tracks, and whether each row agrees with it. `None` for few
+/// tracks.
 fn field_through(tracks: &[MarkerTrack]) -> Option<(LocalField<2>, Vec<(usize, bool)>)> {
     let seen: Vec<_> = tracks
         .iter()
@@ -466,8 +469,9 @@ fn field_through(tracks: &[MarkerTrack]) -> Option<(LocalField<2>, Vec<(usize, b
     Some((field, kept))
 }
 
-/// By how many of its standard errors, root mean square, the field without the markers beside those
-/// hidden misses them, at least 1: it may go on otherwise in a gap than it does around it.
+/// Error of the field in gaps, in its standard errors but at least 1: the root mean square
+/// deviation from the visible markers next to hidden ones, if those are left out. The field may
+/// behave differently in a gap.
 fn gap_error(tracks: &[MarkerTrack]) -> f64 {
     let [hidden, seen] = [false, true].map(|seen| -> Vec<&MarkerTrack> {
         tracks
@@ -493,7 +497,8 @@ fn gap_error(tracks: &[MarkerTrack]) -> f64 {
             .filter(|(_, beside)| **beside == on_rim);
         tracks.map(|(track, _)| **track).collect()
     });
-    // Gaps all over the face are as wide as the spacing, and the field is known in them.
+    // If gaps are spread over the whole face, they are as wide as the spacing, and the field is
+    // known there.
     if hidden.is_empty() || rim.len() > rest.len() {
         return 1.0;
     }
@@ -509,10 +514,10 @@ fn gap_error(tracks: &[MarkerTrack]) -> f64 {
     (square.sum::<f64>() / rim.len() as f64).sqrt().max(1.0)
 }
 
-/// Area of a marker's cell in square pixels. `None` if all lie on a line.
+/// Area of a marker's cell in square pixels. `None` if all markers lie on a line.
 ///
-/// Pick's theorem: a convex polygon of a lattice with B points on its outline and n in all covers
-/// n − B/2 − 1 cells, whatever the lattice is. It is nearly so of markers that are scattered.
+/// By Pick's theorem, a convex polygon of a lattice with B points on its outline and n points in
+/// total covers n − B/2 − 1 cells of any lattice. For scattered markers this is approximately true.
 fn cell_area(points: &[Point2<f64>]) -> Option<f64> {
     let spacing = nearest_rows(points, points, 2).into_iter().zip(points);
     let spacing = spacing.filter_map(|(near, p)| Some((points[*near.get(1)?] - p).norm()));
@@ -524,7 +529,8 @@ fn cell_area(points: &[Point2<f64>]) -> Option<f64> {
             .map(|(a, b)| a.coords.perp(&b.coords))
             .sum::<f64>()
             .abs();
-    // Markers a quarter of the spacing inside stand on the outline, but for their scatter.
+    // Markers up to a quarter of the spacing inside count as on the outline, because of their
+    // scatter.
     let on_outline = |p: &&Point2<f64>| {
         edges().any(|(a, b)| {
             let along = b - a;
@@ -558,7 +564,7 @@ fn convex_hull(points: &[Point2<f64>]) -> Vec<Point2<f64>> {
     hull
 }
 
-/// A marker's way from one frame to another, and the standard error of a coordinate of it.
+/// Displacement of a marker between two frames, with the standard error of a coordinate.
 #[derive(Clone, Copy)]
 struct Step {
     from: Point2<f64>,
@@ -576,7 +582,7 @@ impl Step {
     }
 }
 
-/// A turn about the origin, then a shift.
+/// A rotation about the origin, then a translation.
 #[derive(Clone, Copy)]
 struct RigidMotion {
     turn: Rotation2<f64>,
@@ -592,7 +598,7 @@ impl RigidMotion {
         (self.image(step.from) - step.to).norm() > (SLIP_ERRORS * step.error).max(LEAST_SLIP_PX)
     }
 
-    /// By least squares. `None` without steps.
+    /// The least-squares motion. `None` without steps.
     fn of_all(steps: &[Step]) -> Option<Self> {
         let n = steps.len() as f64;
         let mean = |place: fn(&Step) -> Point2<f64>| {
@@ -615,8 +621,8 @@ impl RigidMotion {
         })
     }
 
-    /// The motion of two steps that misses least in the median of all (Rousseeuw, J. Am. Stat.
-    /// Assoc. 79, 871–880, 1984).
+    /// The motion through two steps with the smallest median deviation of all steps (Rousseeuw, J.
+    /// Am. Stat. Assoc. 79, 871–880, 1984).
     fn of_most(steps: &[Step]) -> Option<Self> {
         let some: Vec<&Step> = steps.iter().step_by(steps.len().div_ceil(TRIED)).collect();
         let pairs = (0..some.len()).flat_map(|a| (0..a).map(move |b| (a, b)));

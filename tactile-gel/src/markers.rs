@@ -1,4 +1,4 @@
-//! Markers printed on a gel, found in a frame.
+//! Detection of markers printed on a gel.
 
 use nalgebra::Point2;
 use ndarray::{Array2, ArrayView2, Zip};
@@ -12,12 +12,12 @@ pub struct Marker {
     pub position_px: Point2<f64>,
     /// Standard error of a coordinate from the image's noise, in pixels.
     pub standard_error_px: f64,
-    /// Pixels.
+    /// Area in pixels.
     pub area_px: f64,
 }
 
 impl Marker {
-    /// A marker that was found elsewhere.
+    /// A marker that was detected by other means.
     pub fn new(position_px: Point2<f64>, standard_error_px: f64, area_px: f64) -> Self {
         Self {
             position_px,
@@ -27,12 +27,12 @@ impl Marker {
     }
 }
 
-/// Finds dark markers of one size in grey levels.
+/// Finds dark markers of similar size in an image of grey levels.
 ///
-/// Levels are divided by the mean of the brighter pixels around them, which takes out colours and
-/// slow shading, and cut by Otsu's threshold. Highlights inside a marker are filled. A centre is
-/// the mean of a marker's pixels, weighted with their darkness. Patches below a third or above 1.8
-/// times the median area are left out: broken prints, and markers that touch each other. O(pixels).
+/// Levels are divided by the mean of the brighter pixels around them, which removes colours and
+/// slow shading, and are cut by Otsu's threshold. Highlights inside a marker are filled. The centre
+/// is the mean of a marker's pixels, weighted by their darkness. Regions below a third or above 1.8
+/// times the median area are dropped: they are broken prints, or markers that touch. O(pixels).
 ///
 /// ```
 /// use ndarray::Array2;
@@ -52,9 +52,9 @@ pub fn find_markers(grey: ArrayView2<'_, f64>) -> Vec<Marker> {
     if rows < 16 || columns < 16 {
         return Vec::new();
     }
-    // Markers are smaller than an eighth of the frame, their distances too.
+    // Markers, and the distances between them, are smaller than an eighth of the frame.
     let reach = rows.max(columns) / 16;
-    // Single precision is far below an 8-bit level, and memory is most of the time.
+    // Single precision is far finer than an 8-bit level, and memory traffic takes most of the time.
     let mut share = Array2::zeros((rows, columns));
     box_sums(&grey.mapv(|level| level as f32), 1, &mut share);
     over_box_areas(&mut share, 1);
@@ -68,7 +68,7 @@ pub fn find_markers(grey: ArrayView2<'_, f64>) -> Vec<Marker> {
     bright *= &share;
     let mut ground = Array2::zeros((rows, columns));
     box_sums(&bright, reach, &mut ground);
-    // Levels over the mean of the brighter ones, which is taken as one level at least.
+    // Levels relative to the mean of the brighter ones, which is at least one level.
     Zip::from(&mut share)
         .and(&ground)
         .and(&count)
@@ -80,7 +80,7 @@ pub fn find_markers(grey: ArrayView2<'_, f64>) -> Vec<Marker> {
     let Some(usual) = median(found.iter().map(|patch| patch.len() as f64)) else {
         return Vec::new();
     };
-    // Larger patches are left out anyway.
+    // Larger regions are dropped anyway.
     for (k, patch) in found.iter_mut().enumerate() {
         if (patch.len() as f64) < 1.8 * usual {
             let holes = holes(patch, &owner, k, columns);
@@ -96,7 +96,7 @@ pub fn find_markers(grey: ArrayView2<'_, f64>) -> Vec<Marker> {
     let marker = |patch: &Vec<usize>| {
         let darkness = |at: &usize| cut - f64::from(share[[at / columns, at % columns]]);
         let most = median(patch.iter().map(darkness)).unwrap_or(1.0).max(0.0);
-        // Highlights weigh as the rest of the marker.
+        // Highlights get the weight of the rest of the marker.
         let weight = |at: &usize| match darkness(at) {
             d if d > 0.0 => d.min(most),
             _ => most,
@@ -111,20 +111,20 @@ pub fn find_markers(grey: ArrayView2<'_, f64>) -> Vec<Marker> {
         }
         let (n, centre) = (patch.len() as f64, Point2::new(sums[1], sums[2]) / sums[0]);
         let spread = (sums[3] / n - centre.coords.norm_squared()).max(1.0);
-        // Half of the spread belongs to each axis, and every pixel's weight has the noise.
+        // Each axis has half of the spread, and the weight of each pixel has the noise.
         let error = noise * (0.5 * n * spread).sqrt() / sums[0];
         Marker::new(centre, error, n)
     };
     found.iter().map(marker).collect()
 }
 
-/// Sums over boxes of 2 `reach` + 1 pixels a side, as far as they lie in the frame: running sums of
-/// columns, then of their row.
+/// Sums over boxes of 2 `reach` + 1 pixels per side, clipped to the frame: running sums along
+/// columns, then along rows.
 fn box_sums(values: &Array2<f32>, reach: usize, sums: &mut Array2<f32>) {
     let (rows, columns) = values.dim();
     let mut tall = vec![0.0_f32; columns];
-    // The row's running sum from `reach` + 1 pixels before its first pixel to `reach` after its
-    // end.
+    // The running sum of the row, from `reach` + 1 pixels before its first pixel to `reach` after
+    // its end.
     let mut running = vec![0.0; columns + 2 * reach + 1];
     for last in 0..rows + reach {
         if last < rows {
@@ -151,7 +151,7 @@ fn box_sums(values: &Array2<f32>, reach: usize, sums: &mut Array2<f32>) {
     }
 }
 
-/// Turns sums over boxes into means.
+/// Divides sums over boxes by their areas.
 fn over_box_areas(sums: &mut Array2<f32>, reach: usize) {
     let (rows, columns) = sums.dim();
     let length = |k: usize, n: usize| ((k + reach + 1).min(n) - k.saturating_sub(reach)) as f32;
@@ -164,10 +164,10 @@ fn over_box_areas(sums: &mut Array2<f32>, reach: usize) {
     }
 }
 
-/// Otsu's threshold of shares from 0 to 1.5, and the standard deviation of the brighter class.
-/// `None` for one class.
+/// Otsu's threshold of relative levels from 0 to 1.5, and the standard deviation of the brighter
+/// class. `None` if there is only one class.
 fn threshold(share: &Array2<f32>) -> Option<(f64, f64)> {
-    /// A twentieth of a grey level in 100.
+    /// A twentieth of a grey level at level 100.
     const WIDTH: f64 = 0.0005;
     const PER_SHARE: f32 = (1.0 / WIDTH) as f32;
     let mut histogram = vec![0.0; (1.5 / WIDTH) as usize];
@@ -176,7 +176,7 @@ fn threshold(share: &Array2<f32>) -> Option<(f64, f64)> {
     bins.for_each(|bin| histogram[bin] += 1.0);
     let level = |k: usize| (k as f64 + 0.5) * WIDTH;
     let cut = otsu(&histogram, level)?;
-    // The median deviation of the gel bears what is printed on it.
+    // The median deviation of the gel tolerates the printed markers.
     let first = ((cut / WIDTH) as usize).min(last);
     let gel = &histogram[first..];
     let half = 0.5 * gel.iter().sum::<f64>();
@@ -194,7 +194,7 @@ fn threshold(share: &Array2<f32>) -> Option<(f64, f64)> {
         more = beside.sum();
         within += more;
     }
-    // Pixels are spread evenly over the bins at that distance.
+    // Pixels are distributed evenly over the bins at that distance.
     let share = (half - (within - more)) / more;
     let bins = if distance == 0 {
         0.5 * share
@@ -205,11 +205,11 @@ fn threshold(share: &Array2<f32>) -> Option<(f64, f64)> {
     (level(middle + first) - cut > 3.0 * noise).then_some((cut, noise))
 }
 
-/// No patch owns the pixel.
+/// The pixel belongs to no region.
 const NOBODY: u32 = u32::MAX;
 
-/// Patches of at least nine pixels below `cut` that are connected by their sides, as places in
-/// reading order, and the patch of every pixel.
+/// Regions of at least nine pixels below `cut` that are connected by their sides, as positions in
+/// reading order, and the region of each pixel.
 fn patches(share: &Array2<f32>, cut: f64) -> (Vec<Vec<usize>>, Vec<u32>) {
     let mut owner = vec![NOBODY; share.len()];
     let mut dark: Vec<bool> = share.iter().map(|share| f64::from(*share) < cut).collect();
@@ -222,7 +222,7 @@ fn patches(share: &Array2<f32>, cut: f64) -> (Vec<Vec<usize>>, Vec<u32>) {
     (found, owner)
 }
 
-/// Places inside patch `k` that are not its own: those that no path from around it reaches.
+/// Positions inside region `k` that do not belong to it: those that no path from outside reaches.
 fn holes(patch: &[usize], owner: &[u32], k: usize, columns: usize) -> Vec<usize> {
     let (low, high) = (
         patch[0] / columns,
@@ -232,7 +232,7 @@ fn holes(patch: &[usize], owner: &[u32], k: usize, columns: usize) -> Vec<usize>
     let left = across.clone().min().unwrap_or(0);
     let wide = across.max().unwrap_or(0) - left + 3;
     let high = high - low + 3;
-    // The box of the patch with a rim of one pixel.
+    // The box of the region with a margin of one pixel.
     let place = |cell: usize| {
         let (r, c) = (cell / wide, cell % wide);
         let inside = r > 0 && r + 1 < high && c > 0 && c + 1 < wide;
@@ -240,12 +240,12 @@ fn holes(patch: &[usize], owner: &[u32], k: usize, columns: usize) -> Vec<usize>
     };
     let own = |cell: usize| place(cell).is_some_and(|at| owner[at] == k as u32);
     let mut open: Vec<bool> = (0..high * wide).map(|cell| !own(cell)).collect();
-    // The region around the patch begins with the rim.
+    // The region around it starts in the margin.
     let inner = regions(&mut open, wide).skip(1).flatten();
     inner.filter_map(place).collect()
 }
 
-/// The middle value, the upper of two. `None` without any.
+/// The median, the upper one of two. `None` if there are no values.
 fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.collect();
     (!values.is_empty()).then(|| tactile_core::statistics::median(&mut values))

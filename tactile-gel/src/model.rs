@@ -1,6 +1,6 @@
-//! What a calibration knows of a gel's colours.
+//! Parameters of a calibrated gel.
 
-/// The numbers that a calibration of [`GelSensor`](crate::GelSensor) finds, as a file keeps them.
+/// The parameters found by a calibration of [`GelSensor`](crate::GelSensor), in the file format.
 ///
 /// ```
 /// use tactile_gel::{GelModel, GelSensor};
@@ -17,19 +17,20 @@
 pub struct GelModel {
     /// Size of a pixel on the gel in metres.
     pub pixel_size_m: f64,
-    /// Coefficients of n_x and n_y, 60 each. They belong to the 20 monomials of the differences in
-    /// 50 grey levels, then to those times x, then times y, with x and y from −1 to 1.
+    /// Coefficients of n_x and n_y, 60 each, for the 20 monomials of the differences in units of 50
+    /// grey levels, then for these times x, then times y, with x and y from −1 to 1.
     pub coefficients: [Vec<f64>; 2],
-    /// Standard error of n_x and n_y, from presses left out in turn.
+    /// Standard error of n_x and n_y, from leaving out one press at a time.
     pub normal_standard_error: f64,
-    /// Standard error of the depth of one pixel in metres, from presses left out in turn.
+    /// Standard error of the depth of one pixel in metres, from leaving out one press at a time.
     pub depth_standard_error_m: f64,
-    /// Relative standard error of all slopes of a frame together, from presses left out in turn.
+    /// Relative standard error common to all slopes of a frame, from leaving out one press at a
+    /// time.
     #[cfg_attr(feature = "serde", serde(default = "unknown_slope_error"))]
     pub slope_standard_error: f64,
 }
 
-/// Of files that were written before slopes had an error of their own: that of usual calibrations.
+/// Default for files written before this error existed: that of typical calibrations.
 #[cfg(feature = "serde")]
 fn unknown_slope_error() -> f64 {
     0.05

@@ -1,9 +1,9 @@
 //! The linear law of an elastic face in the frequency domain: pressure ↔ displacement ↔ slopes.
 //!
-//! A pressure p of wavenumber k moves the face by u = f L(kh)/k with f = 2p/E*, E* the gel's plane
-//! strain modulus and L = 1 on a half-space. So f = k u/L: of slopes that is a transform of order
-//! zero, f̂ = −i (k_x p̂ + k_y q̂)/(k L), which does not amplify their noise. Outside of a contact f
-//! vanishes, whatever the face does there.
+//! A pressure p of wavenumber k displaces the face by u = f L(kh)/k, with f = 2p/E*, the gel's
+//! plane-strain modulus E*, and L = 1 on a half-space. So f = k u/L. In terms of slopes this is a
+//! transform of order zero, f̂ = −i (k_x p̂ + k_y q̂)/(k L), which does not amplify their noise.
+//! Outside contacts f vanishes, regardless of the shape of the face.
 //!
 //! For one layer of thickness h, bonded to a rigid plate, with s = kh and κ = 3 − 4ν,
 //! L = (2κ sinh 2s − 4s)/(2κ cosh 2s + 4s² + 1 + κ²) (Dhaliwal & Rau, Int. J. Eng. Sci. 8, 843–856,
@@ -15,11 +15,11 @@ use ndarray::{Array2, ArrayView2};
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 
-/// The least L that pressure is divided by. Smaller ones belong to waves far longer than the layer
-/// is thick, which the frame shows least of.
+/// Minimum L for the division. Smaller values belong to waves much longer than the thickness of the
+/// layer, which a frame hardly contains.
 const LEAST_YIELD: f64 = 0.05;
 
-/// A bonded layer: its thickness in cells and Poisson's ratio.
+/// A bonded layer: its thickness in cells, and Poisson's ratio.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LayerShape {
     pub thickness: f64,
@@ -27,9 +27,9 @@ pub(crate) struct LayerShape {
 }
 
 impl LayerShape {
-    /// L(s) of the module's documentation.
+    /// The function L(s) of the module's documentation.
     pub(crate) fn yields(self, wavenumber: f64) -> f64 {
-        // Beyond 20 both hyperbolic functions are the same exponential.
+        // Above 20 both hyperbolic functions equal the same exponential.
         let s = (wavenumber * self.thickness).clamp(1e-4, 20.0);
         let kappa = 3.0 - 4.0 * self.poisson_ratio;
         let (sinh, cosh) = ((2.0 * s).sinh(), (2.0 * s).cosh());
@@ -41,15 +41,15 @@ impl LayerShape {
 pub(crate) struct Plane {
     shape: (usize, usize),
     padded: (usize, usize),
-    /// L of every wavenumber of the transposed spectrum. Empty for a half-space.
+    /// L at each wavenumber of the transposed spectrum. Empty for a half-space.
     yields: Vec<f32>,
-    /// Transforms along columns and along rows, forwards and back.
+    /// Transforms along columns and rows, forward and inverse.
     forward: [Arc<dyn Fft<f32>>; 2],
     inverse: [Arc<dyn Fft<f32>>; 2],
 }
 
-/// A number from `cells` upwards whose only prime factors are 2, 3 and 5, of which transforms are
-/// quick.
+/// The next number from `cells` upwards whose only prime factors are 2, 3 and 5, which makes
+/// transforms fast.
 fn smooth_size(cells: usize) -> usize {
     let smooth = |n: &usize| {
         let mut rest = *n;
@@ -64,7 +64,8 @@ fn smooth_size(cells: usize) -> usize {
 }
 
 impl Plane {
-    /// With room of `room` times the grid beside it, which keeps copies apart.
+    /// Creates the transforms, padded by `room` times the size of the grid, which separates
+    /// periodic copies.
     pub(crate) fn new(shape: (usize, usize), room: f64, layer: Option<LayerShape>) -> Self {
         let larger = |n: usize| smooth_size((n as f64 * (1.0 + room)).ceil() as usize);
         let padded = (larger(shape.0), larger(shape.1));
@@ -107,10 +108,10 @@ impl Plane {
         self.real(out).0
     }
 
-    /// The part of slopes that belongs to no surface: their curl, scaled as `pressure` scales their
-    /// divergence.
+    /// The part of the slopes that does not belong to a surface: their curl, scaled like the
+    /// divergence in `pressure`.
     pub(crate) fn curl(&self, p: ArrayView2<'_, f32>, q: ArrayView2<'_, f32>) -> Array2<f32> {
-        // A quarter turn of the slopes makes their curl a divergence.
+        // Rotating the slopes by 90° turns their curl into a divergence.
         let turned = p.mapv(|p| -p);
         self.pressure(q, turned.view())
     }
@@ -124,7 +125,7 @@ impl Plane {
             if k > 0.0 {
                 spectrum[at] * (yields / k)
             } else {
-                // The longest wave of all stands for the mean.
+                // The longest wave stands for the mean.
                 let (longest, at) = self.longest();
                 spectrum[0] * (self.yields.get(at).copied().unwrap_or(1.0) / longest)
             }
@@ -147,7 +148,7 @@ impl Plane {
         }
     }
 
-    /// The spectrum of `re` + i `im`, column after column.
+    /// The spectrum of `re` + i `im`, column by column.
     fn spectrum(
         &self,
         re: ArrayView2<'_, f32>,
@@ -165,14 +166,14 @@ impl Plane {
                 to.iter_mut().zip(im.row(r)).for_each(|(to, v)| to.im = *v);
             }
         }
-        // Rows of the room are zero, and so are their transforms.
+        // Padded rows are zero, and so are their transforms.
         self.forward[0].process(&mut field[..self.shape.0 * columns]);
         let mut turned = transposed(&field, columns);
         self.forward[1].process(&mut turned);
         turned
     }
 
-    /// A spectrum from each place, that of the negative wavenumber, and the wavenumbers.
+    /// Builds a spectrum from each index, that of the negative wavenumber, and the wavenumbers.
     fn each(&self, value: impl Fn(usize, usize, [f32; 2]) -> Complex<f32>) -> Vec<Complex<f32>> {
         let (rows, columns) = self.padded;
         let along: Vec<f32> = (0..rows).map(|r| wavenumber(r, rows)).collect();
@@ -202,7 +203,7 @@ impl Plane {
     }
 }
 
-/// Spectra of the real and of the imaginary part of a field, from its own at k and at −k.
+/// Spectra of the real and the imaginary part of a field, from its spectrum at k and −k.
 fn parts(here: Complex<f32>, there: Complex<f32>) -> [Complex<f32>; 2] {
     let there = there.conj();
     let odd = here - there;
@@ -212,8 +213,8 @@ fn parts(here: Complex<f32>, there: Complex<f32>) -> [Complex<f32>; 2] {
     ]
 }
 
-/// Signed wavenumber in radians per cell. That of the shortest wave has no sign, and is 0 so that
-/// fields stay real.
+/// Signed wavenumber in radians per cell. The shortest wave has no sign; its wavenumber is 0, so
+/// that fields stay real.
 fn wavenumber(k: usize, n: usize) -> f32 {
     let step = core::f64::consts::TAU / n as f64;
     if 2 * k == n {
@@ -228,7 +229,7 @@ fn wavenumber(k: usize, n: usize) -> f32 {
 fn transposed(field: &[Complex<f32>], width: usize) -> Vec<Complex<f32>> {
     let high = field.len() / width;
     let mut turned = vec![Complex::default(); field.len()];
-    // Blocks that stay in the first-level cache.
+    // Block size that fits in the first-level cache.
     const BLOCK: usize = 16;
     for top in (0..high).step_by(BLOCK) {
         for left in (0..width).step_by(BLOCK) {
@@ -285,8 +286,8 @@ pub(crate) fn bessel_j0(x: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Hertz: a ball moves the face by d − r²/2R inside of a = √(R d), under 2p/E* = 4a/πR
-    /// √(1 − r²/a²).
+    /// Hertz: a ball displaces the face by d − r²/2R inside a = √(R d), under 2p/E* = 4a/πR √(1 −
+    /// r²/a²).
     #[test]
     fn slopes_of_a_ball_have_the_pressure_of_hertz() {
         let (a, ball) = (14.0_f64, 40.0);
@@ -310,7 +311,7 @@ mod tests {
         for ((row, column), f) in f.indexed_iter() {
             let r = (column as f64 - 50.0).hypot(row as f64 - 44.0) / a;
             let truth = 4.0 * a / (core::f64::consts::PI * ball) * (1.0 - r * r).max(0.0).sqrt();
-            // The edge's root is sharper than a pixel, and slopes end with the frame.
+            // The root at the edge is sharper than a pixel, and slopes end with the frame.
             let bound = if (r - 1.0).abs() < 0.15 { 0.1 } else { 0.03 };
             let inside = (8..82).contains(&row) && (8..92).contains(&column);
             assert!(
@@ -320,7 +321,7 @@ mod tests {
         }
     }
 
-    /// What a pressure moves is read back as that pressure, on a layer too.
+    /// The displacement by a pressure gives the same pressure again, also on a layer.
     #[test]
     fn pressure_and_slopes_are_inverse() {
         let f = Array2::from_shape_fn((60, 72), |(r, c)| {
@@ -334,7 +335,7 @@ mod tests {
         let plane = Plane::new(f.dim(), 1.0, Some(layer));
         let (_, [p, q]) = plane.moved(f.view());
         let back = plane.pressure(p.view(), q.view());
-        // Slopes are cut at the frame, so that the longest waves are not whole.
+        // Slopes are cut at the frame, so the longest waves are incomplete.
         let miss = back
             .iter()
             .zip(&f)

@@ -1,9 +1,10 @@
-//! Where the face is at rest: the level far away, beyond the frame.
+//! The rest level of the face: the level far away, outside the frame.
 //!
-//! Along the border the face is not at rest. A point force moves the free face of a half-space by
-//! f dA/2πr, with f = 2p/E*, and that of a bonded layer of thickness h by f dA g(r/h)/h, which falls
-//! off sooner and turns its sign. How thick the gel is, the free face of a frame shows or does not:
-//! the level is the mean over likely thicknesses, and their scatter is a part of its error.
+//! Along the border the face is not at rest. A point force displaces the free face of a half-space
+//! by f dA/2πr, with f = 2p/E*, and that of a bonded layer of thickness h by f dA g(r/h)/h, which
+//! decays sooner and changes its sign. The free face in a frame may or may not reveal the thickness
+//! of the gel: the level is the mean over likely thicknesses, and their scatter is part of its
+//! error.
 
 use ndarray::Array2;
 
@@ -11,37 +12,41 @@ use crate::contacts::quantile;
 use crate::layer::GelLayer;
 use crate::plane::{LayerShape, bessel_j0};
 
-/// Thicknesses in longer sides of the frame, and a half-space.
+/// Thicknesses in units of the frame's longer side, and a half-space.
 const THICKNESSES: [f64; 9] = [0.06, 0.09, 0.13, 0.19, 0.28, 0.41, 0.6, 0.9, f64::INFINITY];
-/// The tail is tabulated up to this distance in thicknesses, beyond which it is nothing.
+/// The tail is tabulated up to this distance in thicknesses, and zero from there.
 const REACH: f64 = 8.0;
 const STEPS_PER_THICKNESS: usize = 20;
-/// Places along both sides of the frame together.
+/// Number of positions along both sides of the frame together.
 const PLACES: usize = 28;
-/// Blocks of pressure along the longer side.
+/// Number of pressure blocks along the longer side.
 const SOURCES: usize = 80;
-/// Rises beside one another share some of their error: of so many one counts. This, the next two and
-/// the last two limit how often the depth's interval fails (`--example exact_worlds`, "below far").
+/// Neighbouring rises share part of their error: this number counts as one. This constant, the next
+/// two and the last two determine how often the interval of the depth fails
+/// (`--example exact_worlds`, "below far").
 const SHARED: f64 = 24.0;
-/// Share of the rises, root mean square, that no thickness explains.
+/// Fraction of the root mean square rise that no thickness explains.
 const FAMILY_ERROR: f64 = 0.08;
-/// All gels far thicker than the frame is wide are one half-space: it counts for so many thicknesses.
+/// Weight of the half-space, in thicknesses: it stands for all gels much thicker than the frame is
+/// wide.
 const HALF_SPACES: f64 = 4.0;
-/// The pressure was found as of a half-space. On a layer it is up to so many times as much.
+/// Factor between the pressures of a layer and of a half-space, for which the pressure was
+/// computed.
 const STRENGTHS: [f64; 2] = [0.7, 2.5];
-/// Error of the level in pixels: the noise of the slopes adds up over the frame.
+/// Error of the level in pixels: the noise of the slopes accumulates over the frame.
 const NOISE_PX: f64 = 0.03;
-/// Error of the level as a share of the places' mean distance from it.
+/// Error of the level as a fraction of the positions' mean distance from it.
 const UNEVEN: f64 = 0.3;
-/// Error of the level as a share of the tail, of what the family of layers does not hold.
+/// Error of the level as a fraction of the tail, for effects outside the family of layers.
 const SHAPE_ERROR: f64 = 0.15;
 
-/// Steps of the distance along the longer side, and distances up to the frame's diagonal.
+/// Number of distance steps along the longer side, and of distances up to the diagonal of the
+/// frame.
 const STEPS: usize = 1024;
 const DISTANCES: usize = 1450;
 
-/// The tails of layers of Poisson's ratio 0.48: r/h times g(r/h) of each thickness, at distances in
-/// steps of the frame's longer side.
+/// The tails of layers with a Poisson ratio of 0.48: r/h times g(r/h) for each thickness, at
+/// distances in steps of the frame's longer side.
 pub(crate) struct Tails(Vec<[f64; THICKNESSES.len()]>);
 
 /// ρ g(ρ) of a layer, tabulated.
@@ -54,7 +59,7 @@ impl Tails {
         Self((0..=DISTANCES).map(at).collect())
     }
 
-    /// Adds `strength` times the tails at a distance in longer sides.
+    /// Adds `strength` times the tails at a distance, in units of the longer side.
     fn add(&self, distance: f64, strength: f64, tails: &mut [f64; THICKNESSES.len()]) {
         let at = distance * STEPS as f64;
         let low = (at as usize).min(DISTANCES - 1);
@@ -71,7 +76,7 @@ impl LayerTail {
             thickness: 1.0,
             poisson_ratio: GelLayer::DEFAULT_POISSON_RATIO,
         };
-        // 2πg = ∫ L(s) J₀(sρ) ds, of which L = 1 gives 1/ρ. L − 1 falls off as e^(−2s).
+        // 2πg = ∫ L(s) J₀(sρ) ds. The part L = 1 gives 1/ρ, and L − 1 decays as e^(−2s).
         let (last, steps) = (12.0, 480_usize);
         let step = last / steps as f64;
         let less: Vec<f64> = (0..=steps)
@@ -109,7 +114,7 @@ impl LayerTail {
     }
 }
 
-/// The level that the face has far away, and its standard error, in metres.
+/// The level of the face far away with its standard error, in metres.
 pub(crate) fn rest(
     tails: &Tails,
     depth: &Array2<f64>,
@@ -145,7 +150,8 @@ pub(crate) fn rest(
     if places.is_empty() {
         return (depth.iter().sum::<f64>() / depth.len() as f64, 0.0);
     }
-    // Rises from place to place: noise that adds up over the frame hardly shows in them.
+    // Rises between neighbouring positions hardly contain the noise that accumulates over the
+    // frame.
     let beside = |(r, c): (usize, usize)| [grid.get((r, c + 1)), grid.get((r + 1, c))];
     let rises = grid.indexed_iter().flat_map(|(at, here)| {
         let pairs = beside(at)
@@ -163,7 +169,7 @@ pub(crate) fn rest(
         .fold(f64::INFINITY, f64::min);
     let all: f64 = rises.iter().map(|(a, b)| (b.depth - a.depth).powi(2)).sum();
     let count = (rises.len() as f64 / SHARED).max(1.0);
-    // Likelihoods, with the variance that the best fit shows.
+    // Likelihoods with the variance estimated from the best fit.
     let variance = least + FAMILY_ERROR * FAMILY_ERROR * all + f64::MIN_POSITIVE;
     let weight = |k: usize| {
         let prior = if THICKNESSES[k].is_finite() {
@@ -185,13 +191,13 @@ pub(crate) fn rest(
     (rest, scatter.hypot(SHAPE_ERROR * tail).hypot(noise))
 }
 
-/// A place of the free face: its depth, and the tail of each thickness there.
+/// A position on the free face: its depth, and the tail of each thickness there.
 struct Place {
     depth: f64,
     tail: [f64; THICKNESSES.len()],
 }
 
-/// Pressure of the contacts in blocks: f dA in square pixels, and its place as column and row.
+/// Pressure of the contacts in blocks: f dA in square pixels, with column and row.
 fn sources(labels: &Array2<u16>, pressure: &Array2<f32>) -> Vec<[f64; 3]> {
     let mut sources = Vec::new();
     let (rows, columns) = pressure.dim();
@@ -216,12 +222,12 @@ fn sources(labels: &Array2<u16>, pressure: &Array2<f32>) -> Vec<[f64; 3]> {
     sources
 }
 
-/// A level under the tail of one thickness.
+/// A fitted level with the tail of one thickness.
 struct Level {
     level: f64,
-    /// Sum of squares that is left of the rises.
+    /// Residual sum of squares of the rises.
     left: f64,
-    /// Means over the places of the tail and of the distance from the level.
+    /// Means over the positions of the tail and of the distance from the level.
     tail: f64,
     spread: f64,
 }
@@ -244,7 +250,7 @@ impl Level {
             .iter()
             .map(|place| (place.depth - strength * place.tail[k]) as f32)
             .collect();
-        // The median is not moved by a contact that was not seen, as a mean would be.
+        // Unlike a mean, the median is not affected by an undetected contact.
         let level = f64::from(quantile(&mut levels, 0.5));
         let spread = levels.iter().map(|z| (f64::from(*z) - level).abs());
         Self {
@@ -260,8 +266,8 @@ impl Level {
 mod tests {
     use super::*;
 
-    /// At a small distance a layer is a half-space, and its mean displacement is that of the longest
-    /// wave: 4(κ − 1)/(1 + κ)² thicknesses.
+    /// At a small distance a layer acts as a half-space. Its mean displacement is that of the
+    /// longest wave: 4(κ − 1)/(1 + κ)² thicknesses.
     #[test]
     fn tails_of_layers_begin_as_those_of_half_spaces() {
         let tails = LayerTail::new();

@@ -1,10 +1,10 @@
-//! A gel that is lit in colours: from a frame to gradients, face and contacts.
+//! A gel lit in colours: from a frame to gradients, face and contacts.
 //!
-//! The colour of a pixel, less that of the untouched gel, depends on the surface's normal and on
-//! the place in the image. A polynomial of third degree in the three colour differences, whose
-//! coefficients change linearly over the image, gives the normal's components n_x and n_y. Presses
-//! of one ball determine it: inside the contact circle n = (x − x₀, y − y₀)/R. Over presses left
-//! out in turn it was as good as polynomials of higher degree, with fewer numbers to determine.
+//! The colour of a pixel, minus that of the untouched gel, depends on the normal of the surface and
+//! on the position in the image. A third-degree polynomial in the three colour differences, with
+//! coefficients that vary linearly over the image, gives the components n_x and n_y of the normal.
+//! Presses of one ball determine it: inside the contact circle n = (x − x₀, y − y₀)/R. In
+//! leave-one-out tests it was as accurate as polynomials of higher degree, with fewer parameters.
 
 use std::sync::Arc;
 
@@ -21,24 +21,24 @@ use crate::model::GelModel;
 use crate::plane::Plane;
 use crate::rest::Tails;
 
-/// Largest sine of a slope. A steeper one is read as 76°: beyond it light hardly changes, and the
-/// slope itself has no end.
+/// Largest sine of a slope. A steeper one is limited to 76°, because light hardly changes beyond it
+/// and the tangent diverges.
 const STEEPEST: f32 = 0.97;
 
-/// Noise in grey levels that two frames of eight bits have at least, of their rounding alone.
+/// Minimum noise in grey levels of the difference of two 8-bit frames, from rounding alone.
 const LEAST_NOISE_GREY: f64 = 0.41;
-/// Share of a pixel's noise that is left in the smoothed pressure: the blurs by frame, cells and
-/// smoothing add up to a variance of 9.25 px², and noise falls by √(4π · 9.25).
+/// Fraction of a pixel's noise in the smoothed pressure: the blurs by frame, cells and smoothing
+/// add up to a variance of 9.25 px², which reduces noise by √(4π · 9.25).
 const SMOOTHED: f64 = 0.093;
-/// Room beside the grid of the pressure, as a share of it. Copies of a contact fall off with the
-/// distance squared.
+/// Padding of the pressure grid, as a fraction of its size. Periodic copies of a contact decay with
+/// the square of the distance.
 const ROOM: f64 = 0.2;
 
-/// A gel's sensor: what its colours say about the face.
+/// A gel sensor, which derives the shape of the face from its colours.
 ///
-/// Reads 8-bit frames of three channels. A common exposure and a shift of all levels of a channel
-/// between frames are taken off by the frame's border. [`calibrate`](Self::calibrate) makes one
-/// from presses of a ball. O(n log n) for the n pixels of a frame.
+/// It reads 8-bit frames of three channels. Changes of exposure and of the level of a channel
+/// between frames are corrected with the border of the frame. [`calibrate`](Self::calibrate)
+/// creates a sensor from presses of a ball. O(n log n) for the n pixels of a frame.
 #[derive(Clone)]
 pub struct GelSensor {
     pub(crate) model: GelModel,
@@ -60,7 +60,7 @@ impl core::fmt::Debug for GelSensor {
 }
 
 impl GelSensor {
-    /// A sensor from its model and its frame without contact, `[row, column, channel]`.
+    /// Creates a sensor from its model and its frame without contact, `[row, column, channel]`.
     ///
     /// # Errors
     /// [`GelError::EmptyImage`], [`GelError::ShapeMismatch`] unless there are three channels and 60
@@ -94,7 +94,7 @@ impl GelSensor {
         }
     }
 
-    /// The same sensor with other numbers.
+    /// The same sensor with other parameters.
     pub(crate) fn with_model(&self, model: GelModel) -> Self {
         Self {
             model,
@@ -102,7 +102,7 @@ impl GelSensor {
         }
     }
 
-    /// The numbers of the calibration.
+    /// The parameters of the calibration.
     pub fn model(&self) -> &GelModel {
         &self.model
     }
@@ -112,15 +112,15 @@ impl GelSensor {
         self.untouched.view()
     }
 
-    /// Rows and columns of its frames.
+    /// Number of rows and columns of its frames.
     pub fn shape(&self) -> (usize, usize) {
         self.reference.dim()
     }
 
     /// Gradients, face and contacts of a frame of the reference's size.
     ///
-    /// A frame that is not this sensor's has [`doubts`](GelFrame::doubts). Where they
-    /// [refuse](FrameDoubt::refuses) it, it has no contact and its face is NaN.
+    /// A frame that does not come from this sensor has [`doubts`](GelFrame::doubts). If they
+    /// [reject](FrameDoubt::refuses) it, it has no contacts and its face is NaN.
     ///
     /// # Errors
     /// [`GelError::ShapeMismatch`].
@@ -135,7 +135,7 @@ impl GelSensor {
         self.read_blurred(&frame, doubts)
     }
 
-    /// A frame at the reference's exposure, and why it may not be this sensor's.
+    /// A frame corrected to the exposure of the reference, with doubts about its origin.
     pub(crate) fn checked(&self, frame: Blurred) -> (Blurred, Vec<FrameDoubt>) {
         let light = light(&Blocks::of(&frame), &self.blocks);
         (frame.divided_by(light.gain), light.doubts)
@@ -155,7 +155,7 @@ impl GelSensor {
         face::frame((&self.model, &self.tails), slopes, &cells, found, doubts)
     }
 
-    /// The patches of contact of a frame.
+    /// The contact regions of a frame.
     pub(crate) fn patches(&self, frame: &Blurred) -> Vec<Patch> {
         patches(
             &self.cells(&self.slopes(frame)),
@@ -164,10 +164,10 @@ impl GelSensor {
         )
     }
 
-    /// Slopes of the depth at every pixel.
+    /// Slopes of the depth at each pixel.
     fn slopes(&self, frame: &Blurred) -> [Array2<f32>; 2] {
         let [mut p, mut q] = normals(frame, &self.reference, &self.model.coefficients);
-        // Arrays that were made here are slices.
+        // Arrays created here are contiguous.
         if let (Some(p), Some(q)) = (p.as_slice_mut(), q.as_slice_mut()) {
             slopes(p, q);
         }
@@ -183,7 +183,7 @@ impl GelSensor {
         }
     }
 
-    /// The least noise of the smoothed pressure, from the rounding of levels.
+    /// The minimum noise of the smoothed pressure, from the rounding of levels.
     fn noise_floor(&self) -> f32 {
         let linear = self.model.coefficients.iter().flat_map(|c| &c[1..4]);
         let square: f64 = linear.map(|c| c * c).sum();
@@ -191,17 +191,18 @@ impl GelSensor {
     }
 }
 
-/// Turns normals into slopes of the depth.
+/// Converts normals into slopes of the depth.
 fn slopes(p: &mut [f32], q: &mut [f32]) {
     vectorised(
         #[inline(always)]
         || {
             for (p, q) in p.iter_mut().zip(q.iter_mut()) {
                 let sine = (*p * *p + *q * *q).sqrt();
-                // Both components shrink alike, so that the direction of the slope is kept.
+                // Both components are reduced by the same factor, which preserves the direction of
+                // the slope.
                 let cut = STEEPEST / sine.max(STEEPEST);
                 let (x, y) = (*p * cut, *q * cut);
-                // Outward normals of the gel rise where depth falls.
+                // The outward normals of the gel point up where the depth decreases.
                 let up = -(1.0 - x * x - y * y).sqrt();
                 (*p, *q) = (x / up, y / up);
             }
@@ -209,7 +210,7 @@ fn slopes(p: &mut [f32], q: &mut [f32]) {
     );
 }
 
-/// Refuses images without pixels or with other than three channels.
+/// Rejects images without pixels or with a number of channels other than three.
 pub(crate) fn colour_image(image: ArrayView3<'_, u8>) -> Result<ArrayView3<'_, u8>, GelError> {
     let (rows, columns, channels) = image.dim();
     if rows == 0 || columns == 0 {

@@ -1,5 +1,5 @@
-//! Frames of a gel that is lit in colours from three sides, with the truth at every pixel, and exact
-//! faces: a ball on a half-space by Hertz's law, and pressures on a bonded layer.
+//! Simulated frames of a gel lit in colours from three sides, with the truth at each pixel, and
+//! exact faces: a ball on a half-space by Hertz's law, and pressures on a bonded layer.
 
 use ndarray::{Array2, Array3};
 use rand::SeedableRng;
@@ -8,12 +8,12 @@ use rand_distr::{Distribution, Normal};
 
 use crate::plane::bessel_j0;
 
-/// A gel with a Lambertian face that red, green and blue lamps light from three sides.
+/// A gel with a Lambertian face, lit from three sides by red, green and blue lamps.
 ///
-/// The level of a channel is ambient + brightness · fall-off · max(n·l, 0) · gain, with noise, in
-/// eight bits. Lamps stand 120° apart at `elevation` above the face, and their light falls linearly
-/// across the frame. A face turned away from a lamp gets none of its light. Light that the
-/// surroundings block, and light that other walls reflect, are left out.
+/// The level of a channel is ambient + brightness · fall-off · max(n·l, 0) · gain plus noise, in
+/// eight bits. Lamps are 120° apart at `elevation` above the face, and their light decreases
+/// linearly across the frame. A face that points away from a lamp gets none of its light. Shadows
+/// and reflections from other walls are neglected.
 ///
 /// ```
 /// use tactile_gel::simulate::{ColourGel, GelObject};
@@ -23,30 +23,30 @@ use crate::plane::bessel_j0;
 /// assert!((depth[[60, 80]] - (30.0 - 500_f64.sqrt())).abs() < 1e-9);
 /// let frame = gel.frame(&depth, 1);
 /// assert_eq!(frame.dim(), (120, 160, 3));
-/// assert_eq!(frame, gel.frame(&depth, 1)); // the seed fixes the noise
+/// assert_eq!(frame, gel.frame(&depth, 1)); // the seed determines the noise
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColourGel {
-    /// Rows and columns.
+    /// Number of rows and columns.
     pub shape: [usize; 2],
     /// Elevation of the lamps above the face in radians.
     pub elevation: f64,
-    /// Share by which a lamp's light falls from its side of the frame to the other.
+    /// Fraction by which a lamp's light decreases from its side of the frame to the other.
     pub fall_off: f64,
-    /// Standard deviation of a pixel's noise in grey levels.
+    /// Standard deviation of the pixel noise in grey levels.
     pub noise: f64,
-    /// Factor of all levels, as of an exposure that changes between frames.
+    /// Factor of all levels, for an exposure that changes between frames.
     pub gain: f64,
-    /// Factors of the brightness of red, green and blue lamp: those of another unit are others.
+    /// Brightness factors of the red, green and blue lamps, which vary between units.
     pub lamps: [f64; 3],
-    /// Angle in radians by which all lamps are turned.
+    /// Angle in radians by which all lamps are rotated.
     pub turn: f64,
-    /// Length in pixels over which the free gel around a contact comes up to its rest.
+    /// Length in pixels over which the free gel around a contact returns to its rest level.
     pub sag_px: f64,
 }
 
 impl Default for ColourGel {
-    /// 160 × 120 pixels, lamps at 35°, light that falls by 0.4, noise of one level.
+    /// 160 × 120 pixels, lamps at 35°, light that decreases by 0.4, noise of one level.
     fn default() -> Self {
         Self {
             shape: [120, 160],
@@ -61,7 +61,7 @@ impl Default for ColourGel {
     }
 }
 
-/// What is pressed into the gel. Lengths in pixels.
+/// An object pressed into the gel. Lengths are in pixels.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum GelObject {
@@ -72,23 +72,23 @@ pub enum GelObject {
         /// Radius of the contact circle.
         contact_px: f64,
     },
-    /// A flat punch whose edge is rounded, as a parabola.
+    /// A flat punch with an edge rounded as a parabola.
     Flat {
-        /// Radius of the flat and its edge.
+        /// Radius of the flat with its edge.
         contact_px: f64,
         /// Depth.
         depth_px: f64,
-        /// Width of the edge, over which the depth falls to zero.
+        /// Width of the edge, over which the depth decreases to zero.
         edge_px: f64,
     },
-    /// A wedge along y: depth falls linearly to both sides of an edge.
+    /// A wedge along y: depth decreases linearly on both sides of an edge.
     Edge {
         /// Half the width of the contact.
         contact_px: f64,
         /// Depth at the edge.
         depth_px: f64,
     },
-    /// A ball with waves of this height and length.
+    /// A ball with sinusoidal waves.
     Texture {
         /// Radius of the ball.
         radius_px: f64,
@@ -102,7 +102,7 @@ pub enum GelObject {
 }
 
 impl GelObject {
-    /// Depth at a place relative to the object's middle, and whether it touches there.
+    /// Depth at a position relative to the object's centre. `None` outside the contact.
     fn depth_px(&self, x: f64, y: f64) -> Option<f64> {
         let distance = x.hypot(y);
         let cap = |radius: f64, contact: f64| {
@@ -140,7 +140,7 @@ impl GelObject {
         }
     }
 
-    /// Slope of the free gel at the rim, and the distance from it.
+    /// Slope of the free gel at the rim, and the distance from the rim.
     fn rim(&self, x: f64, y: f64) -> (f64, f64) {
         match *self {
             Self::Ball {
@@ -169,11 +169,11 @@ impl GelObject {
 }
 
 impl ColourGel {
-    /// The gel's surface around an object at (x, y): its depth where it touches, and below zero
-    /// where the free gel hangs from the rim. In pixels.
+    /// The gel's surface around an object at (x, y), in pixels: positive depth in the contact, and
+    /// negative depth where the free gel hangs from the rim.
     ///
-    /// The free gel falls from the rim as −s L (1 − e^(−d/L)), with the object's slope s there, the
-    /// distance d and the length L. It is level far away.
+    /// The free gel decreases from the rim as −s L (1 − e^(−d/L)), with the object's slope s at the
+    /// rim, the distance d and the length L. It is level far away.
     pub fn depth_px(&self, object: &GelObject, [x0, y0]: [f64; 2]) -> Array2<f64> {
         let [rows, columns] = self.shape;
         Array2::from_shape_fn((rows, columns), |(row, column)| {
@@ -190,7 +190,7 @@ impl ColourGel {
         let [rows, columns] = self.shape;
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let noise = Normal::new(0.0, self.noise).ok();
-        // The surface is continued level beyond the frame's edge.
+        // The surface is extended horizontally outside the frame.
         let at = |row: usize, column: usize| depth_px[[row.min(rows - 1), column.min(columns - 1)]];
         let mut frame = Array3::zeros((rows, columns, 3));
         for ((row, column, channel), level) in frame.indexed_iter_mut() {
@@ -202,7 +202,7 @@ impl ColourGel {
             let across = (column as f64 / columns as f64 - 0.5) * cos
                 + (row as f64 / rows as f64 - 0.5) * sin;
             let (up, flat) = self.elevation.sin_cos();
-            // The gel bulges towards the camera: its normal is (p, q, 1) seen from there.
+            // The gel bulges towards the camera, from which its normal is (p, q, 1).
             let lit = (flat * (p * cos + q * sin) + up) / (1.0 + p * p + q * q).sqrt();
             let lamp = 170.0 * self.lamps[channel] * (1.0 + self.fall_off * across);
             let light = 40.0 + lamp * lit.max(0.0);
@@ -213,26 +213,26 @@ impl ColourGel {
     }
 }
 
-/// A pressure p₀ √(1 − r²/a²) on an elastic face: that of a ball by Hertz's law.
+/// A pressure p₀ √(1 − r²/a²) on an elastic face, as under a ball by Hertz's law.
 ///
 /// ```
 /// use tactile_gel::simulate::{ElasticFace, HertzPress};
-/// // A ball of 40 px in contact up to 10 px sinks by a²/R below the free face, half of it below the
-/// // contact's rim.
+/// // A ball of 40 px in contact up to 10 px sinks by a²/R below the free face, half of it below
+/// // the rim of the contact.
 /// let press = HertzPress::ball([32.0, 24.0], 40.0, 10.0);
 /// let depth = ElasticFace::HALF_SPACE.depth_px([48, 64], &[press]);
 /// assert!((depth[[24, 32]] - 2.5).abs() < 1e-12 && (depth[[24, 42]] - 1.25).abs() < 1e-6);
-/// // A layer that is thin beside the contact yields less.
+/// // A layer that is thin compared with the contact yields less.
 /// let layer = ElasticFace { thickness_px: 20.0, poisson_ratio: 0.48 };
 /// assert!(layer.depth_px([48, 64], &[press])[[24, 32]] < 2.0);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HertzPress {
-    /// Column and row of the middle.
+    /// Column and row of the centre.
     pub at_px: [f64; 2],
-    /// Radius a of the contact.
+    /// Contact radius a.
     pub contact_px: f64,
-    /// 2 p₀/E*, with the gel's plane strain modulus E*.
+    /// 2 p₀/E*, with the gel's plane-strain modulus E*.
     pub pressure: f64,
 }
 
@@ -246,7 +246,7 @@ impl HertzPress {
         }
     }
 
-    /// Its force ⅔ π a² p₀ in newtons.
+    /// The force ⅔ π a² p₀ in newtons.
     pub fn force_n(&self, plane_strain_modulus_pa: f64, pixel_size_m: f64) -> f64 {
         let area = core::f64::consts::PI * (self.contact_px * pixel_size_m).powi(2);
         2.0 / 3.0 * area * 0.5 * self.pressure * plane_strain_modulus_pa
@@ -269,12 +269,12 @@ impl ElasticFace {
         poisson_ratio: 0.5,
     };
 
-    /// Linear displacement in pixels of rows and columns of pixels, of all presses together.
+    /// Linear displacement in pixels, on a grid of rows and columns, under all presses together.
     pub fn depth_px(&self, [rows, columns]: [usize; 2], presses: &[HertzPress]) -> Array2<f64> {
         let mut depth = Array2::zeros((rows, columns));
         for press in presses {
             let reach = (rows as f64).hypot(columns as f64) + press.at_px[0].hypot(press.at_px[1]);
-            // The layer's part is smooth: values a pixel apart are enough.
+            // The contribution of the layer is smooth, so values one pixel apart are enough.
             let less: Vec<f64> = match self.thickness_px.is_finite() {
                 true => (0..reach as usize + 2)
                     .map(|r| self.less(press, r as f64))
@@ -292,10 +292,10 @@ impl ElasticFace {
         depth
     }
 
-    /// What the layer takes off a half-space's displacement at a distance.
+    /// Reduction of a half-space's displacement by the finite layer, at a distance.
     ///
-    /// With the transform 2π p₀ a² (sin ka − ka cos ka)/(ka)³ of the pressure the displacement is
-    /// ∫ p̄ L J₀(kr) dk/πE*. L − 1 falls off as e^(−2kh).
+    /// With the transform 2π p₀ a² (sin ka − ka cos ka)/(ka)³ of the pressure, the displacement is
+    /// ∫ p̄ L J₀(kr) dk/πE*. L − 1 decays as e^(−2kh).
     fn less(&self, press: &HertzPress, r: f64) -> f64 {
         let (a, h) = (press.contact_px, self.thickness_px);
         let kappa = 3.0 - 4.0 * self.poisson_ratio;
@@ -310,7 +310,7 @@ impl ElasticFace {
                 / (2.0 * kappa * cosh + 4.0 * s * s + 1.0 + kappa * kappa);
             transform * (yields - 1.0) * bessel_j0(k * r)
         };
-        // Simpson's rule with steps that follow the fastest wave over the frame.
+        // Simpson's rule with steps that resolve the fastest wave over the frame.
         let last = 12.0 / h;
         let steps = 2 * (200 + (last * (r + a) * 2.0) as usize);
         let step = last / steps as f64;
