@@ -1,11 +1,11 @@
-//! Where the object touches: detection against the noise, and the contact's sums.
+//! Contact detection against the noise, and the sums over a contact.
 //!
-//! A frame is first tested by the one pass over it ([`FrameStatistics`]). Contact is suspected
-//! where one pixel, or one tile of 8 × 32 pixels, differs from the reference by more than its noise
-//! allows at the stated false-alarm rate *per frame*. Only there a mask is made: smooth if the
-//! contact is faint, threshold, keep the largest component, fill its holes. Sums run over the mask
-//! grown by a margin (the *aperture*) with signed differences, so that the edge, where the signal
-//! is below the noise, is not cut off.
+//! A frame is first tested in one pass ([`FrameStatistics`]). A contact is suspected if a pixel, or
+//! a tile of 8 × 32 pixels, differs from the reference by more than its noise permits at the stated
+//! false-alarm rate *per frame*. Only there a mask is computed: smoothing if the contact is faint,
+//! threshold, selection of the largest component, filling of its holes. Sums run over the mask
+//! extended by a margin (the *aperture*) with signed differences, so that the edge, where the
+//! signal is below the noise, is not cut off.
 
 use ndarray::{ArrayView2, Axis, Slice};
 use tactile_core::{BoundingBox, Estimate, Polarity, Requirement};
@@ -19,11 +19,11 @@ use crate::region::{Extent, NoiseWorkspace, Region, Sums, gain, greatest};
 use crate::runs::Run;
 use crate::tiles::{TILE_COLUMNS, Tiles};
 
-/// Pixels by which the mask grows to the aperture that is summed. Beyond 4 the blurred edge of a
-/// sharp lens is below the noise, and more adds noise to the force alone.
+/// Pixels by which the mask is extended to the aperture that is summed. Beyond 4 pixels the blurred
+/// edge of a sharp lens is below the noise, and a wider margin only adds noise to the force.
 const MARGIN_PX: usize = 4;
 
-/// One contact. Its mask stays in the workspace.
+/// One contact. Its mask is in the workspace.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -45,24 +45,25 @@ const MARGIN_PX: usize = 4;
 pub struct Contact {
     /// Box around the mask.
     pub bounding_box: BoundingBox,
-    /// Number of pixels of the mask.
+    /// Number of pixels in the mask.
     pub area_px: usize,
-    /// Radius of the circle of the mask's area, √(area/π), in pixels.
+    /// Radius of the circle with the area of the mask, √(area/π), in pixels.
     pub equivalent_radius_px: f64,
-    /// Σ d over the aperture, positive for contact of either polarity.
+    /// Σ d over the aperture, positive for a contact of either polarity.
     pub integrated_pixel_value: Estimate,
     /// Intensity centroid [x, y] in pixels, equations (7) and (8).
     pub centroid_px: [Estimate; 2],
-    /// Greatest difference inside the mask.
+    /// Largest difference inside the mask.
     pub peak: f64,
-    /// Number of pixels of the aperture.
+    /// Number of pixels in the aperture.
     pub aperture_px: usize,
-    /// Saturated pixels of the mask (255 if brighter, 0 if darker).
+    /// Saturated pixels in the mask (255 if brighter, 0 if darker).
     pub saturated_px: usize,
-    /// Other patches of contact in the frame's region, each at least a hundredth of this one. They
-    /// are not part of it.
+    /// Number of other contact regions in the frame's region, each at least a hundredth as large as
+    /// this one. They are not part of it.
     pub other_contacts: usize,
-    /// The aperture reaches the edge of the frame: part of the contact may be missing.
+    /// Whether the aperture reaches the edge of the frame, so that part of the contact may be
+    /// missing.
     pub touches_edge: bool,
 }
 
@@ -87,13 +88,13 @@ pub struct Detection {
     pub statistics: FrameStatistics,
     /// The correction of illumination and stray light.
     pub drift: IlluminationDrift,
-    /// The noise that the errors are computed from. `None` without contact.
+    /// The noise from which the errors are computed. `None` without contact.
     pub noise: Option<DifferenceNoise>,
-    /// The contact, if there is one.
+    /// The contact. `None` if there is none.
     pub contact: Option<Contact>,
 }
 
-/// The options of contact detection.
+/// Options of contact detection.
 ///
 /// ```
 /// use tactile_force::{ContactOptions, DriftCorrection, ForceError, Polarity};
@@ -119,8 +120,8 @@ pub struct ContactOptions {
 }
 
 impl Default for ContactOptions {
-    /// Brighter contact, one false alarm in a thousand frames, drift corrected where the frame shows
-    /// it, at most 1 % of the contact saturated.
+    /// Brighter contact, one false alarm in a thousand frames, drift correction if the frame
+    /// reveals the drift, and at most 1 % of the contact saturated.
     fn default() -> Self {
         Self {
             polarity: Polarity::Brighter,
@@ -132,38 +133,39 @@ impl Default for ContactOptions {
 }
 
 impl ContactOptions {
-    /// Looks for contact that is brighter or darker than the reference.
+    /// Sets whether a contact is brighter or darker than the reference.
     pub fn with_polarity(mut self, polarity: Polarity) -> Self {
         self.polarity = polarity;
         self
     }
 
-    /// Allows a frame without contact to be taken for one with contact with this probability.
+    /// Sets the probability that a frame without contact is mistaken for one with contact.
     ///
     /// # Errors
-    /// A rate that is not above zero and below one.
+    /// An error for a rate that is not between zero and one.
     pub fn with_false_alarm_rate(mut self, rate: f64) -> Result<Self, ForceError> {
         self.false_alarm_rate = Requirement::OpenUnitInterval.check("false_alarm_rate", rate)?;
         Ok(self)
     }
 
-    /// Corrects this change of illumination or stray light.
+    /// Sets which change of illumination or stray light is corrected.
     pub fn with_drift(mut self, correction: DriftCorrection) -> Self {
         self.drift = correction;
         self
     }
 
-    /// Refuses the force of a contact with a larger share of saturated pixels.
+    /// Sets the maximum fraction of saturated pixels above which the force of a contact is
+    /// rejected.
     ///
     /// # Errors
-    /// A share outside zero to one.
+    /// An error for a fraction outside zero to one.
     pub fn with_saturation_limit(mut self, share: f64) -> Result<Self, ForceError> {
         self.saturation_limit = Requirement::UnitInterval.check("saturation_limit", share)?;
         Ok(self)
     }
 }
 
-/// Values read from a file pass the same checks as values set in code.
+/// Values read from a file are validated like values set in code.
 #[cfg(feature = "serde")]
 mod read {
     use serde::{Deserialize, Deserializer, de::Error};
@@ -215,8 +217,8 @@ pub struct DetectorWorkspace {
 }
 
 impl DetectorWorkspace {
-    /// The mask of the last frame's contact (1 inside, 0 outside) over a region, and the region's
-    /// place in the frame. `None` if there was no contact.
+    /// The mask of the last frame's contact (1 inside, 0 outside) over a region, with the position
+    /// of the region in the frame. `None` if there was no contact.
     pub fn mask(&self) -> Option<(BoundingBox, ArrayView2<'_, u8>)> {
         let place = self.region.place?;
         let view =
@@ -224,9 +226,9 @@ impl DetectorWorkspace {
         Some((place, view))
     }
 
-    /// The grey histogram of the last frame's contact over its aperture, each pixel covering
-    /// `pixel_area_m2`: a row of the fit of a [`PressureCurve`](crate::PressureCurve). `None` if
-    /// there was no contact.
+    /// The grey histogram of the last frame's contact over its aperture, with `pixel_area_m2` per
+    /// pixel: a row in the fit of a [`PressureCurve`](crate::PressureCurve). `None` if there was no
+    /// contact.
     ///
     /// ```
     /// use ndarray::Array2;
@@ -260,7 +262,7 @@ impl DetectorWorkspace {
     }
 }
 
-/// Components of fewer pixels are noise.
+/// Components with fewer pixels are noise.
 const MINIMUM_AREA_PX: usize = 4;
 
 /// Finds the contact in frames of one sensor.
@@ -286,15 +288,16 @@ pub struct ContactDetector {
 }
 
 impl ContactDetector {
-    /// A detector with these options.
+    /// Creates a detector with these options.
     pub fn new(options: ContactOptions) -> Self {
         Self { options }
     }
 
-    /// The statistics of the frame and its contact, if there is one.
+    /// The statistics of the frame and its contact. The contact is `None` if there is none.
     ///
     /// # Errors
-    /// The frame has not the reference's size, or too much of the contact is saturated.
+    /// An error if the size of the frame differs from that of the reference, or if too much of the
+    /// contact is saturated.
     pub fn detect_with(
         &self,
         workspace: &mut DetectorWorkspace,
@@ -304,7 +307,7 @@ impl ContactDetector {
         reference.check(frame)?;
         workspace.region.place = None;
         let sd = reference.difference_variance().sqrt();
-        // Half of the false alarms go to single pixels (either sign), half to tiles.
+        // Half of the false alarms are assigned to single pixels (of either sign), half to tiles.
         let pixel_limit =
             (quantile(0.25 * self.options.false_alarm_rate, frame.len()) * sd).min(255.0);
         let statistics = reference.compare_with(&mut workspace.pass, frame, pixel_limit as u8);
@@ -371,8 +374,8 @@ impl ContactDetector {
         }
     }
 
-    /// The mask in a region around the suspect pixels, which grows while the aperture meets its
-    /// border.
+    /// Computes the mask in a region around the suspect pixels. The region grows while the aperture
+    /// reaches its border.
     fn segment(
         &self,
         region: &mut Region,
@@ -386,7 +389,8 @@ impl ContactDetector {
         let mut place = suspect.grown(TILE_COLUMNS, frame.dim());
         loop {
             let signal = region.load(frame, reference, place, drift, sign);
-            // Trials are the pixels of the region alone. The test of the whole frame came before.
+            // The number of trials is that of the region's pixels, because the whole frame was
+            // tested before.
             let z = quantile(self.options.false_alarm_rate, region.difference.len());
             let width = smoothing_width(z * sd, f64::from(signal));
             let limit = z * sd / width as f64;
@@ -398,7 +402,7 @@ impl ContactDetector {
             let needed = region
                 .bounds(&region.mask)?
                 .grown(MARGIN_PX + 1, frame.dim());
-            // The mask and its margin lie inside: the region's border has cut nothing off.
+            // The mask and its margin are inside the region, so its border has cut nothing off.
             if needed.union(place) == place {
                 return Some(extent);
             }
@@ -417,7 +421,7 @@ impl ContactDetector {
         let (x, y) = region
             .bounds(&region.mask)
             .map_or((0.0, 0.0), |b| b.centre());
-        // Flattening divides signal and noise alike.
+        // Flattening divides signal and noise equally.
         let (light, uncertain) = reference
             .flat_field()
             .map_or((1.0, 0.0), |f| (f.at(x, y), f.variance_at(x, y)));
@@ -433,7 +437,7 @@ impl ContactDetector {
         }
     }
 
-    /// Number of saturated pixels of the mask. An error where their share exceeds the limit.
+    /// Number of saturated pixels in the mask. An error if their fraction exceeds the limit.
     fn saturated(
         &self,
         region: &Region,
@@ -464,7 +468,7 @@ impl ContactDetector {
     }
 }
 
-/// The contact of a region.
+/// Computes the contact of a region.
 fn summarise(
     region: &Region,
     sums: &Sums,
@@ -497,7 +501,7 @@ fn summarise(
     }
 }
 
-/// Greatest difference in the mask.
+/// Largest difference in the mask.
 fn peak(region: &Region) -> f32 {
     let columns = region.columns();
     region
@@ -507,15 +511,15 @@ fn peak(region: &Region) -> f32 {
         .fold(0.0, f32::max)
 }
 
-/// The narrowest odd box for which the threshold on its mean, limit/width, is a tenth of the signal
-/// or less.
+/// The narrowest odd box for which the threshold of its mean, limit/width, is at most a tenth of
+/// the signal.
 fn smoothing_width(limit: f64, signal: f64) -> usize {
     let width = (10.0 * limit / signal.max(1.0)).ceil().clamp(1.0, 31.0) as usize;
     width | 1
 }
 
 impl ContactDetector {
-    /// Box around every tile whose sum exceeds its noise, and every pixel that exceeds its own.
+    /// Box around all tiles whose sum exceeds its noise, and all pixels that exceed theirs.
     fn suspect(
         &self,
         pass: &PassWorkspace,
@@ -527,7 +531,7 @@ impl ContactDetector {
     ) -> Option<BoundingBox> {
         let size = (statistics.rows, statistics.columns);
         let bright = self.bright_tiles(&pass.tiles, reference, size, drift, sd);
-        // Pixels were compared with their limit before the drift was known. That holds while the
+        // Pixels were compared with their limit before the drift was known. This is valid while the
         // drift is well below the limit.
         let pixels = statistics
             .bounding_box
@@ -535,7 +539,7 @@ impl ContactDetector {
         bright.into_iter().chain(pixels).reduce(BoundingBox::union)
     }
 
-    /// Box around every tile whose sum exceeds its noise.
+    /// Box around all tiles whose sum exceeds its noise.
     fn bright_tiles(
         &self,
         tiles: &Tiles,
@@ -551,8 +555,8 @@ impl ContactDetector {
             let tile = reference.tile_sum(tiles, k);
             f64::from(sign) * drift.residual(&tile) > z * tile.pixels.sqrt()
         };
-        // The last tile of a band is its smallest: a band whose sums stay below that tile's noise
-        // has no bright tile.
+        // The last tile of a band is the smallest. If all sums of a band are below the noise of
+        // that tile, the band has no bright tile.
         let below_noise = |band: usize| {
             drift.is_zero() && {
                 let last = reference.tile_sum(tiles, (band + 1) * tiles.columns - 1);
@@ -569,12 +573,12 @@ impl ContactDetector {
     }
 }
 
-/// The z with P(N > z) = rate / trials for a standard normal N: among `trials` values one exceeds
-/// it with probability at most `rate`.
+/// The z with P(N > z) = rate / trials for a standard normal N: among `trials` values, the
+/// probability that any exceeds z is at most `rate`.
 fn quantile(rate: f64, trials: usize) -> f64 {
     let tail = rate / trials.max(1) as f64;
-    // Above the quantile, from where Newton's steps on the logarithm of the tail fall to it: that
-    // is concave.
+    // The start is above the quantile. Newton's method on the logarithm of the tail, which is
+    // concave, decreases from there to the quantile.
     let mut z = (-2.0 * tail.ln()).sqrt();
     for _ in 0..60 {
         let upper = 0.5 * libm::erfc(z * std::f64::consts::FRAC_1_SQRT_2);

@@ -7,22 +7,22 @@ use tactile_core::{BoundingBox, Estimate};
 
 use crate::tiles::{TILE_COLUMNS, TILE_ROWS, TileSum};
 
-/// Reference in grey levels below which it is none.
+/// Minimum grey level of a usable reference.
 const LEAST_REFERENCE_GREY: f64 = 1e-3;
 
-/// Probability at which a change is taken for one of stray light: the lamps of a sensor drift more
+/// Probability at which a change is attributed to stray light: the lamps of a sensor drift more
 /// often than the light around it.
 const SURE: f64 = 0.9;
 
-/// Standard errors of the level within which the light has not changed.
+/// The light counts as unchanged within this number of standard errors of the level.
 const CHANGED: f64 = 2.0;
 
-/// Squared standard errors between the background's structure and a change of light alone, and one of
-/// illumination alone, beyond which both have changed.
+/// If changes of stray light alone and of illumination alone both deviate from the background's
+/// structure by more than these squared standard errors, both have changed.
 const BOTH: f64 = 16.0;
 
-/// The change of illumination or stray light that is corrected. Detection takes
-/// [`Automatic`](Self::Automatic) by default.
+/// The change of illumination or stray light that is corrected. The default of detection is
+/// [`Automatic`](Self::Automatic).
 ///
 /// ```
 /// use ndarray::Array2;
@@ -30,7 +30,7 @@ const BOTH: f64 = 16.0;
 ///     ContactDetector, ContactOptions, Detection, DriftCorrection, ReferenceFrame,
 /// };
 ///
-/// // Three grey levels of stray light everywhere are no contact.
+/// // Three grey levels of uniform stray light are not a contact.
 /// let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 20_u8).view())?;
 /// let brighter = Array2::from_elem((160, 160), 23_u8);
 /// let options = ContactOptions::default().with_drift(DriftCorrection::Offset);
@@ -47,22 +47,22 @@ const BOTH: f64 = 16.0;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum DriftCorrection {
-    /// Frames are taken as they are.
+    /// Frames are not corrected.
     #[default]
     None,
-    /// Stray light added everywhere alike: d = f − r − b.
+    /// Uniform additional stray light: d = f − r − b.
     Offset,
     /// Stray light with a gradient: d = f − r − (b + bₓ x + b_y y).
     Plane,
-    /// Illumination brighter or darker, background and signal alike: d = f/g − r.
+    /// Brighter or darker illumination, for background and signal alike: d = f/g − r.
     Illumination,
-    /// Illumination that also changed its distribution, as when an LED moves: d = f/(g + gₓ x + g_y
-    /// y) − r.
+    /// Illumination whose distribution also changed, for example by a moved LED: d = f/(g + gₓ x +
+    /// g_y y) − r.
     TiltedIllumination,
-    /// Illumination g and stray light b together, d = (f − b)/g − r, where the frame shows its level
-    /// ([`DriftOutcome`]), else nothing. The background's structure shows which of them changed. A
-    /// flat background does not: the change is then taken for the illumination, and the error of the
-    /// signal's scale holds both.
+    /// Illumination g and stray light b together, d = (f − b)/g − r, if the frame reveals its level
+    /// ([`DriftOutcome`]); otherwise no correction. The structure of the background reveals which
+    /// of them changed. A uniform background does not: the change is then attributed to the
+    /// illumination, and the error of the signal's scale covers both.
     Automatic,
 }
 
@@ -87,7 +87,7 @@ pub enum DriftCorrection {
 ///     Ok(found.drift.outcome)
 /// };
 /// assert_eq!(outcome(100, 103)?, DriftOutcome::Corrected);
-/// // A black background shows nothing of the illumination.
+/// // A black background reveals nothing about the illumination.
 /// assert!(matches!(outcome(0, 0)?, DriftOutcome::TooDark { .. }));
 /// # Ok::<(), ForceError>(())
 /// ```
@@ -95,27 +95,27 @@ pub enum DriftCorrection {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum DriftOutcome {
-    /// No correction was asked for.
+    /// No correction was requested.
     #[default]
     NotRequested,
     /// The drift was estimated and corrected.
     Corrected,
-    /// The background is too dark beside its noise: the illumination would be known to no better
-    /// than this standard error, where 0.5 % is required. Nothing was corrected.
+    /// The background is too dark compared with its noise: the standard error of the illumination
+    /// would exceed the required 0.5 %. Nothing was corrected.
     TooDark {
         /// Standard error of the relative illumination.
         standard_error: f64,
     },
-    /// Less than half of the frame or of its border agrees on one illumination, as under a contact
-    /// that covers most of it. Nothing was corrected.
+    /// Less than half of the frame or of its border agrees on one illumination, for example under a
+    /// contact that covers most of it. Nothing was corrected.
     TooLittleBackground {
-        /// Share of the tiles that agree, in the frame or along its border.
+        /// Fraction of the tiles that agree, in the frame or along its border.
         share: f64,
     },
-    /// The light is less than half or more than twice the reference's: another exposure or a
-    /// saturated frame, and no drift. Nothing was corrected.
+    /// The light is less than half or more than twice that of the reference: the exposure has
+    /// changed or the frame is saturated. Nothing was corrected.
     OtherLight {
-        /// Light of the frame over that of the reference.
+        /// Light of the frame relative to that of the reference.
         ratio: f64,
     },
 }
@@ -137,8 +137,8 @@ impl DriftCorrection {
     }
 }
 
-/// The drift found in one frame. `coefficients` are [value, per column, per row] about the frame's
-/// middle: grey levels for stray light, shares for illumination.
+/// The drift found in one frame. `coefficients` are [value, per column, per row] relative to the
+/// centre of the frame: grey levels for stray light, relative values for illumination.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -146,7 +146,7 @@ impl DriftCorrection {
 ///     ContactDetector, ContactOptions, Detection, DriftCorrection, ReferenceFrame,
 /// };
 ///
-/// // Illumination a tenth brighter.
+/// // Illumination that is a tenth brighter.
 /// let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 100_u8).view())?;
 /// let brighter = Array2::from_elem((160, 160), 110_u8);
 /// let options = ContactOptions::default().with_drift(DriftCorrection::Illumination);
@@ -162,25 +162,26 @@ impl DriftCorrection {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct IlluminationDrift {
-    /// The correction that was made.
+    /// The correction that was applied.
     pub correction: DriftCorrection,
     /// Whether the drift is known.
     pub outcome: DriftOutcome,
-    /// Offset (grey levels) or relative illumination (1 for unchanged) in the frame's middle, and
-    /// its change per column and per row.
+    /// Offset (grey levels) or relative illumination (1 for unchanged) at the centre of the frame,
+    /// and its change per column and per row.
     pub coefficients: [f64; 3],
-    /// Stray light beside the illumination, in grey levels.
+    /// Stray light in addition to the illumination, in grey levels.
     pub stray_grey: f64,
-    /// Variance of the signal's scale, of an illumination that is known worse than the background.
+    /// Variance of the signal's scale, for an illumination that is known less accurately than the
+    /// background.
     scale_variance: f64,
     /// Standard error of the first coefficient.
     pub standard_error: f64,
-    /// Tiles of 8 × 32 pixels it was read from.
+    /// Number of tiles of 8 × 32 pixels used.
     pub tiles: usize,
     middle: [f64; 2],
     /// Covariance of the coefficients.
     covariance: [[f64; 3]; 3],
-    /// Mean grey level of the reference where the drift was read.
+    /// Mean grey level of the reference in these tiles.
     reference: f64,
 }
 
@@ -194,10 +195,10 @@ pub(crate) struct DriftLine {
 }
 
 impl DriftLine {
-    /// Corrected difference of the pixel `x` columns from the line's start.
+    /// Corrected difference of the pixel `x` columns from the start of the line.
     #[inline(always)]
     pub(crate) fn difference(&self, x: usize, frame: f32, reference: f32) -> f32 {
-        // Frames are narrower than 2³¹, and this conversion has wide instructions.
+        // Frames are narrower than 2³¹, and this conversion has SIMD instructions.
         let level = self.start + self.step * (x as i32) as f32;
         if self.multiplicative {
             (frame - self.stray) / level - reference
@@ -216,8 +217,8 @@ impl IlluminationDrift {
         let [value, per_column, per_row] = self.coefficients;
         let y = row as f64 - self.middle[1];
         let x = first_column as f64 - self.middle[0];
-        // In double precision for the line's start. A step from there in single precision is
-        // enough.
+        // Double precision for the start of the line; single precision is sufficient for the step
+        // from there.
         let start = value + per_column * x + per_row * y;
         DriftLine {
             multiplicative: self.correction.is_multiplicative(),
@@ -227,8 +228,8 @@ impl IlluminationDrift {
         }
     }
 
-    /// Variances due to the correction's own error at a place: of the background in squared grey
-    /// levels, and of the signal's scale.
+    /// Variances due to the error of the correction at a position: of the background in squared
+    /// grey levels, and of the signal's scale.
     pub(crate) fn variances(&self, x: f64, y: f64) -> [f64; 2] {
         let at = [1.0, x - self.middle[0], y - self.middle[1]];
         let mut variance = 0.0;
@@ -247,8 +248,8 @@ impl IlluminationDrift {
         }
     }
 
-    /// Background that the correction subtracts from a frame at a place where the reference is
-    /// `reference`.
+    /// Background that the correction subtracts from a frame at a position, for a reference level
+    /// of `reference`.
     fn level(&self, x: f64, y: f64, reference: f64) -> f64 {
         let at = self.at(x, y);
         if self.correction.is_multiplicative() {
@@ -264,8 +265,8 @@ impl IlluminationDrift {
         value + per_column * (x - self.middle[0]) + per_row * (y - self.middle[1])
     }
 
-    /// The greatest background that the correction removes anywhere in a frame of a given size, in
-    /// grey levels, for a reference of even brightness `mean`.
+    /// The largest background, in grey levels, that the correction removes anywhere in a frame of a
+    /// given size, for a reference of uniform brightness `mean`.
     pub(crate) fn greatest_grey(&self, (rows, columns): (usize, usize), mean: f64) -> f64 {
         if self.is_zero() {
             return 0.0;
@@ -278,7 +279,7 @@ impl IlluminationDrift {
             .fold(0.0, f64::max)
     }
 
-    /// A tile's summed difference after the correction.
+    /// The summed difference of a tile after the correction.
     #[inline]
     pub(crate) fn residual(&self, tile: &TileSum) -> f64 {
         let at = self.at(tile.x, tile.y);
@@ -290,9 +291,9 @@ impl IlluminationDrift {
         tile.difference - background
     }
 
-    /// The automatic correction if its error is small enough, else none and the reason.
+    /// The automatic correction if its error is small enough; otherwise none, with the reason.
     fn accepted(self, tiles: &[TileSum], sd: f64) -> Self {
-        // A face that covers most of the frame is even too, but it does not reach the border.
+        // A face that covers most of the frame is also uniform, but it does not reach the border.
         let [right, bottom] = self.middle.map(|half| 2.0 * half);
         let (wide, high) = (TILE_COLUMNS as f64, TILE_ROWS as f64);
         let at_border = |tile: &TileSum| {
@@ -300,7 +301,7 @@ impl IlluminationDrift {
         };
         let (mut agree, mut all) = ([0.0; 2], [0.0; 2]);
         for tile in tiles {
-            // A tile agrees if its drift is uneven by no more than a hundredth of the background.
+            // A tile agrees if its drift deviates by at most a hundredth of the background.
             let limit = 3.0 * sd * tile.pixels.sqrt() + 0.01 * tile.reference;
             let agrees = f64::from(self.residual(tile).abs() <= limit);
             for k in 0..1 + usize::from(at_border(tile)) {
@@ -311,7 +312,7 @@ impl IlluminationDrift {
         let [whole, border] = [0, 1].map(|k| agree[k] / f64::max(all[k], 1.0));
         let share = f64::min(whole, border);
         let standard_error = self.standard_error;
-        // At 0.5 % the force is off by at most as much as a good gauge.
+        // At 0.5 % the error of the force is at most that of a good gauge.
         let known = standard_error > 0.0 && standard_error <= 0.005 && self.reference > 0.0;
         let refused = |outcome| Self {
             outcome,
@@ -320,7 +321,7 @@ impl IlluminationDrift {
         if !known {
             return refused(DriftOutcome::TooDark { standard_error });
         }
-        // The median that the fit starts from is background only if most tiles are.
+        // The median from which the fit starts is background only if most tiles are.
         if share < 0.5 {
             return refused(DriftOutcome::TooLittleBackground { share });
         }
@@ -335,13 +336,13 @@ impl IlluminationDrift {
         }
     }
 
-    /// One least-squares step by the tiles whose level per pixel is within a limit, in the first
-    /// `TERMS` coefficients. `sd` is the noise of one pixel. Returns the number of tiles.
+    /// One least-squares step of the first `TERMS` coefficients, using the tiles whose level per
+    /// pixel is within a limit. `sd` is the noise of one pixel. Returns the number of tiles.
     ///
-    /// Places count from the frame's middle in units of half the frame.
+    /// Positions are relative to the centre of the frame, in units of half the frame.
     fn step<const TERMS: usize>(&mut self, tiles: &[TileSum], limit: f64, sd: f64) -> usize {
-        // Slopes in half frames keep the three columns of the same size, and the matrix well
-        // conditioned.
+        // Slopes per half frame give the three columns similar sizes, and the matrix a good
+        // condition number.
         let scale = [1.0, self.middle[0].max(1.0), self.middle[1].max(1.0)];
         let (mut matrix, mut right) = (Matrix3::<f64>::identity(), Vector3::<f64>::zeros());
         matrix.view_mut((0, 0), (TERMS, TERMS)).fill(0.0);
@@ -385,15 +386,15 @@ impl IlluminationDrift {
         count
     }
 
-    /// The illumination and the stray light of the tiles whose level per pixel is within a limit: a
-    /// line through their changes over the reference shows which of them changed, else it is taken for
-    /// the illumination. `sd` is the noise of a pixel, and the tiles scatter by so many times that of
-    /// a tile. Returns the number of tiles.
+    /// Fits illumination and stray light to the tiles whose level per pixel is within a limit. A
+    /// line through their changes over the reference reveals which of them changed; otherwise the
+    /// change is attributed to the illumination. `sd` is the noise of a pixel, and `scatter` the
+    /// ratio of the tiles' scatter to the noise of a tile. Returns the number of tiles.
     fn step_both(&mut self, tiles: &[TileSum], limit: f64, sd: f64, scatter: f64) -> usize {
         let near = |tile: &&TileSum| (self.residual(tile) / tile.pixels).abs() <= limit;
         let (mut count, mut pixels, mut sums) = (0, 0.0, [0.0; 8]);
-        // The tile before stands for the reference's structure: the noise of the tile's own
-        // reference is in its change, too, and would make a slope.
+        // The preceding tile stands for the structure of the reference: the change of a tile
+        // contains the noise of its own reference level, which would cause a spurious slope.
         let mut before = None;
         for tile in tiles.iter().filter(near) {
             let (own, change) = (
@@ -431,7 +432,7 @@ impl IlluminationDrift {
         let covariances = [with_own - other * reference, with_change - other * change];
         let variance = (square - other * other).max(f64::MIN_POSITIVE);
         let level_error = (sd / pixels.sqrt()).max(1e-6);
-        // All by illumination, and its error.
+        // Attributed to illumination alone, with its error.
         let own = own.max(LEAST_REFERENCE_GREY * LEAST_REFERENCE_GREY);
         let (all, error) = (moved / own, level_error / own.sqrt());
         let noise = variance * (scatter * level_error).powi(2);
@@ -439,8 +440,8 @@ impl IlluminationDrift {
         let misfit = |gain: f64| (covariances[1] - gain * covariances[0]).powi(2) / noise;
         let [by_light, by_illumination] = [misfit(0.0), misfit(all)];
         let both = by_light.min(by_illumination).min(information * all * all) > BOTH;
-        // The error holds the explanation that is not taken, by its probability, if there is a
-        // change beyond the noise.
+        // If there is a significant change, the error covers the rejected explanation, weighted by
+        // its probability.
         let light = 1.0 / (1.0 + (0.5 * (by_light - by_illumination)).exp());
         let apart = (all * all - (CHANGED * error).powi(2)).max(0.0);
         let (gain, stray, open) = if both {
@@ -478,8 +479,8 @@ pub(crate) struct FitWorkspace {
     pub(crate) scratch: Vec<f64>,
 }
 
-/// Fits the correction to all tiles but those that stand out (the contact), by least squares on the
-/// others, again and again until their number settles. `sd` is the noise of one pixel's difference.
+/// Fits the correction by least squares to all tiles except outliers (the contact), repeated until
+/// the number of tiles settles. `sd` is the noise of one pixel's difference.
 pub(crate) fn fit(
     correction: DriftCorrection,
     (rows, columns): (usize, usize),
@@ -509,14 +510,14 @@ pub(crate) fn fit(
             .iter()
             .map(|tile| drift.residual(tile) / drift.weight(tile)),
     );
-    // A contact that covers less than half of the tiles shifts the median little.
+    // A contact that covers less than half of the tiles shifts the median only slightly.
     drift.coefficients[0] += median(values, scratch);
     let noise = sd / ((TILE_ROWS * TILE_COLUMNS) as f64).sqrt();
     for _ in 0..20 {
         values.clear();
         let level = |tile: &TileSum| (drift.residual(tile) / tile.pixels).abs();
         values.extend(tiles.iter().map(level));
-        // Scatter from the median, which tiles of the contact hardly widen, and no less than the
+        // Scatter about the median, which tiles of the contact hardly widen, but at least the
         // noise.
         let limit = 3.0 * (1.4826 * median(values, scratch)).max(noise);
         let before = drift.tiles;
@@ -525,7 +526,7 @@ pub(crate) fn fit(
             1 => drift.step::<1>(tiles, limit, sd),
             _ => drift.step::<3>(tiles, limit, sd),
         };
-        // The same number of tiles nearly always is the same tiles, and the fit has settled.
+        // An equal number of tiles nearly always means the same tiles, so the fit has converged.
         if drift.tiles == before {
             break;
         }
@@ -537,31 +538,30 @@ pub(crate) fn fit(
     drift
 }
 
-/// The upper median, by [`f64::total_cmp`] (0 of no values). `scratch` is overwritten. A sample
-/// brackets it, so that most values are only counted. The answer does not depend on the sample:
-/// where the bracket missed, all values are looked through.
+/// The upper median, by [`f64::total_cmp`] (0 if there are no values). `scratch` is overwritten. A
+/// sample brackets the median, so that most values are only counted. The result does not depend on
+/// the sample: if the bracket misses, all values are examined.
 pub(crate) fn median(values: &[f64], scratch: &mut Vec<f64>) -> f64 {
     if values.is_empty() {
         return 0.0;
     }
     let middle = values.len() / 2;
     scratch.clear();
-    // One in 32 values is looked at first. A quarter of those of a frame's 5 700 tiles that are few
-    // enough to sort cost more to collect than they leave out.
+    // One in 32 values is sampled first. For the quarter of a frame's 5 700 tiles, collecting the
+    // values would cost more than sorting them saves.
     scratch.extend(values.iter().step_by(32));
     scratch.sort_unstable_by(f64::total_cmp);
-    // Three standard deviations of a sample's rank, ½√n each.
+    // Three standard deviations of a rank in the sample, each ½√n.
     let reach = (1.5 * (scratch.len() as f64).sqrt()).ceil() as usize;
     let centre = scratch.len() / 2;
     let low = scratch[centre.saturating_sub(reach)];
     let high = scratch[(centre + reach).min(scratch.len() - 1)];
     if low <= high {
-        // A value that is not a number, whatever its sign, is neither below nor above: it is among
-        // those looked at.
+        // NaN of either sign is neither below nor above, so it is among the examined values.
         scratch.resize(values.len(), 0.0);
         let (mut below, mut between, mut whole) = (0, 0, true);
         for value in values {
-            // Written always and kept sometimes: no branch to guess.
+            // Written unconditionally and kept conditionally, which avoids a branch.
             scratch[between] = *value;
             below += usize::from(*value < low);
             between += usize::from((*value >= low) & (*value <= high));
@@ -579,12 +579,13 @@ pub(crate) fn median(values: &[f64], scratch: &mut Vec<f64>) -> f64 {
     *scratch.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// How far the light of a frame without contact is from the reference's, in grey levels: the mean
-/// difference of the block of 8 × 8 pixels where it is greatest. The last blocks end at the frame's
-/// edge.
+/// Difference of the light in a frame without contact from that in the reference, in grey levels:
+/// the mean over the block of 8 × 8 pixels where it is largest. The last blocks end at the edge of
+/// the frame.
 ///
-/// `None` up to 4 grey levels, which noise may be, and for images that differ in size. A shift
-/// means other light, or that frame and reference were swapped. O(pixels).
+/// `None` for a difference of up to 4 grey levels, which may be noise, and for images that differ
+/// in size. A larger difference means that the light has changed, or that frame and reference were
+/// swapped. O(pixels).
 ///
 /// ```
 /// use ndarray::Array2;
@@ -605,7 +606,7 @@ pub fn background_shift(frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>
     if frame.dim() != reference.dim() || frame.is_empty() {
         return None;
     }
-    // Smaller than contacts that can be measured, and large enough to average noise.
+    // Smaller than measurable contacts, and large enough to average noise.
     let side = |length: usize| length.min(8);
     let (height, width) = (side(frame.nrows()), side(frame.ncols()));
     let starts = |length: usize| {
@@ -627,13 +628,13 @@ pub fn background_shift(frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>
     (shift.abs() > 4.0).then_some(shift)
 }
 
-/// The median of frame minus reference outside a contact's box, in grey levels, from some 24 rows,
-/// with its standard error.
+/// The median of frame minus reference outside the box of a contact, in grey levels, from about 24
+/// rows, with its standard error.
 ///
-/// Whole grey levels are taken as spread evenly over their width, so that a step of a fraction of a
-/// level is seen. `None` with fewer than 100 pixels and for images that differ in size. A mean
-/// would follow the surroundings of the contact: a dent in a dark sensor is wider than the contact.
-/// O(rows looked at).
+/// Integer grey levels are treated as distributed uniformly over their width, so that a change of a
+/// fraction of a level is detected. `None` for fewer than 100 pixels and for images that differ in
+/// size. A mean would be affected by the surroundings of the contact: a dent in a dark sensor is
+/// wider than the contact. O(examined rows).
 ///
 /// ```
 /// use ndarray::Array2;
@@ -695,8 +696,8 @@ pub fn median_shift_outside(
         }
         255.0
     };
-    // The quartiles of a normal variable lie 1.349 standard deviations apart, and the median of
-    // many scatters by 1.253 of their mean's error.
+    // The quartiles of a normal variable are 1.349 standard deviations apart, and the median of
+    // many values has 1.253 times the error of their mean.
     let sd = (quantile(0.75) - quantile(0.25)) / 1.349;
     let error = 1.253 * sd / (total as f64).sqrt();
     Some(Estimate::new(quantile(0.5), error))
@@ -716,7 +717,7 @@ mod tests {
             ], 0..400),
             nan in proptest::option::of(0_usize..400), period in 1_usize..40,
         ) {
-            // A sample taken at equal steps sees nothing of what lies between them.
+            // A sample at equal steps misses everything between them.
             values.iter_mut().step_by(period).for_each(|v| *v += 10.0);
             if let Some(value) = nan.and_then(|at| values.get_mut(at)) {
                 *value = -f64::NAN;

@@ -1,12 +1,12 @@
-//! The errors of this crate, with the numbers that explain them.
+//! The errors of this crate, with the values that explain them.
 
 use tactile_core::{CustomError, InvalidOption};
 use thiserror::Error;
 
-/// The reason why an input was rejected.
+/// Why an input was rejected.
 ///
-/// No contact is a value, a fit that does not converge is a report, and a calibration used outside
-/// its range is a flag: none of them is an error.
+/// The absence of contact is a value, a fit that does not converge is a report, and a calibration
+/// used outside its range is a flag: none of these is an error.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -20,7 +20,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ForceError {
-    /// Two images that belong together differ in size.
+    /// Two corresponding images differ in size.
     #[error("image of {found:?} (rows, columns) where {expected:?} was expected")]
     SizeMismatch {
         /// Rows and columns of the first image.
@@ -28,7 +28,7 @@ pub enum ForceError {
         /// Rows and columns of the second.
         found: (usize, usize),
     },
-    /// An image without pixels, or no image at all.
+    /// An image has no pixels, or there is no image.
     #[error("an image needs at least one row and one column, found {rows} x {columns}")]
     EmptyImage {
         /// Rows found.
@@ -36,7 +36,7 @@ pub enum ForceError {
         /// Columns found.
         columns: usize,
     },
-    /// An image with more rows or columns than the exact integer sums have room for.
+    /// An image has too many rows or columns for the exact integer sums.
     #[error("image side of {found} pixels exceeds the limit of {limit}")]
     ImageTooLarge {
         /// The longer side found.
@@ -44,64 +44,63 @@ pub enum ForceError {
         /// The longest side allowed.
         limit: usize,
     },
-    /// A reference frame too dark to show how evenly it is lit.
+    /// The reference frame is too dark to determine the uniformity of its light.
     #[error(
         "the reference's mean of {mean} grey levels is below the {required} needed to see its \
          vignetting"
     )]
     ReferenceTooDark {
-        /// Its mean grey level.
+        /// Mean grey level of the reference.
         mean: f64,
-        /// The least mean that will do.
+        /// Minimum mean grey level.
         required: f64,
     },
-    /// Too much of the contact is saturated for its force to be known.
+    /// Too much of the contact is saturated for a reliable force.
     #[error("{share} of the contact is saturated, more than the stated {limit}")]
     SaturatedContact {
-        /// Saturated share of the contact's pixels.
+        /// Fraction of the contact's pixels that are saturated.
         share: f64,
-        /// The share stated in the options.
+        /// Limit in the options.
         limit: f64,
     },
-    /// Fewer observations than a fit with an error estimate needs.
+    /// There are fewer observations than a fit with an error estimate needs.
     #[error("{found} observations cannot determine {required} parameters with an error estimate")]
     TooFewPairs {
-        /// The least number that can.
+        /// Minimum number of observations.
         required: usize,
-        /// The number given.
+        /// Number of observations given.
         found: usize,
     },
-    /// A calibration or shear observation with a NaN or an infinity in it.
+    /// A calibration or shear observation contains NaN or infinity.
     #[error("observation {index} is not finite")]
     NonFinitePair {
-        /// Its place in the slice.
+        /// Index in the slice.
         index: usize,
     },
-    /// All observations were taken at (nearly) the same input: the slope is unknown.
+    /// All observations have (nearly) the same input, so the slope is undetermined.
     #[error("the observations span too little ({span}) to determine a slope")]
     DegeneratePairs {
         /// Spread of the input.
         span: f64,
     },
-    /// The fitted force falls where the pixel value rises, and a monotone calibration was asked
-    /// for.
+    /// The fitted force decreases with the pixel value, but a monotone calibration is required.
     #[error("the force falls from pixel value {from} to {to}")]
     NotMonotone {
-        /// Pixel value at which the force starts to fall.
+        /// Pixel value at which the force starts to decrease.
         from: f64,
-        /// Pixel value at which it is lower.
+        /// Pixel value with a lower force.
         to: f64,
     },
-    /// An option outside its domain.
+    /// An option is outside its range.
     #[error(transparent)]
     InvalidOption(#[from] InvalidOption),
-    /// The failure of a user's own stage, such as a calibration.
+    /// A user-defined stage, such as a calibration, failed.
     #[error(transparent)]
     Custom(CustomError),
 }
 
 impl ForceError {
-    /// The failure of a user's own stage: an error, or a message.
+    /// Wraps the error or message of a user-defined stage.
     ///
     /// ```
     /// use tactile_force::ForceError;

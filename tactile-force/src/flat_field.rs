@@ -1,13 +1,13 @@
-//! The flat field of a lens that vignettes, from the reference's own brightness.
+//! The flat field of a lens with vignetting, from the brightness of the reference itself.
 
 use nalgebra::{SMatrix, SVector};
 
 use crate::tiles::TileSum;
 
-/// Brightness relative to the frame's middle: a quadratic L(x, y) in x and y, least squares over
+/// Brightness relative to the centre of the frame: a quadratic L(x, y), fitted by least squares to
 /// the tiles of a reference frame.
 ///
-/// Where stray light reaches the camera through the same lens as the signal, the reference shows
+/// If stray light reaches the camera through the same lens as the signal, the reference contains
 /// the vignetting of both.
 ///
 /// ```
@@ -31,11 +31,11 @@ use crate::tiles::TileSum;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlatField {
-    /// Coefficients of 1, u, v, u², uv, v², with u and v running from −1 to 1 over the frame. The
-    /// first is 1.
+    /// Coefficients of 1, u, v, u², uv, v², with u and v from −1 to 1 over the frame. The first is
+    /// 1.
     pub coefficients: [f64; 6],
     middle: [f64; 2],
-    /// Covariance of the unscaled coefficients over the square of the first.
+    /// Covariance of the unscaled coefficients, divided by the square of the first.
     covariance: [[f64; 6]; 6],
 }
 
@@ -44,18 +44,18 @@ pub struct FlatField {
 pub(crate) struct FlatLine([f64; 3]);
 
 impl FlatLine {
-    /// At `x` columns from the line's start.
+    /// Value at `x` columns from the start of the line.
     #[inline(always)]
     pub(crate) fn at(&self, x: usize) -> f32 {
-        // Frames are narrower than 2³¹, and this conversion has wide instructions.
+        // Frames are narrower than 2³¹, and this conversion has SIMD instructions.
         let x = f64::from(x as i32);
         (self.0[0] + x * (self.0[1] + x * self.0[2])) as f32
     }
 }
 
 impl FlatField {
-    /// `None` if the reference is black or has too few tiles for six coefficients. `variance` is
-    /// that of one pixel of the reference.
+    /// Fits the flat field. `None` if the reference is black or has too few tiles for six
+    /// coefficients. `variance` is that of one pixel of the reference.
     pub(crate) fn fit(
         (rows, columns): (usize, usize),
         tiles: impl Iterator<Item = TileSum>,
@@ -70,7 +70,7 @@ impl FlatField {
         }
         let cholesky = normal.cholesky()?;
         let (found, inverse) = (cholesky.solve(&right), cholesky.inverse());
-        // Relative to the frame's middle, where u and v are zero.
+        // Relative to the centre of the frame, where u and v are zero.
         let level = found[0];
         (level > 0.0).then(|| Self {
             coefficients: std::array::from_fn(|k| found[k] / level),
@@ -84,7 +84,7 @@ impl FlatField {
     /// Variance of the relative brightness at a pixel: the ratio of two correlated levels.
     pub(crate) fn variance_at(&self, x: f64, y: f64) -> f64 {
         let mut by = terms(self.middle, x, y);
-        // The level in the middle appears in numerator and denominator of the ratio.
+        // The level at the centre is in both the numerator and the denominator of the ratio.
         by[0] -= self.at(x, y);
         let row = |i: usize| {
             by.iter()
@@ -120,5 +120,5 @@ pub(crate) fn terms(middle: [f64; 2], x: f64, y: f64) -> [f64; 6] {
     [1.0, u, v, u * u, u * v, v * v]
 }
 
-/// Longest side for which every integer sum of the pass fits its type: 16384⁴/3 · 255 < 2⁶³.
+/// Longest side for which all integer sums of the pass fit their types: 16384⁴/3 · 255 < 2⁶³.
 pub(crate) const LONGEST_SIDE: usize = 16_384;

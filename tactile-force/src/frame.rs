@@ -1,4 +1,4 @@
-//! The one pass over a frame, the reference it is compared with, and the noise of both.
+//! The single pass over a frame, the reference it is compared with, and the noise of both.
 
 use ndarray::{Array2, ArrayView2};
 use tactile_core::BoundingBox;
@@ -9,10 +9,10 @@ use crate::noise::NoiseModel;
 use crate::outline_box::{Pair, Tiled, tighten};
 use crate::tiles::{TileSum, Tiles, scan};
 
-/// The sum of the signed difference d = frame − reference of a whole frame, exact in integers, and
-/// where it is large.
+/// The sum of the signed difference d = frame − reference over a whole frame, exact in integers,
+/// and the box where the difference is large.
 ///
-/// Differences keep their sign: clamping the negative ones to zero would turn noise into force.
+/// Differences keep their sign, because clamping negative ones to zero would turn noise into force.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -37,14 +37,14 @@ pub struct FrameStatistics {
     pub columns: usize,
     /// Σ d.
     pub sum: i64,
-    /// Number of pixels of the frame at 255.
+    /// Number of pixels with the value 255.
     pub saturated: usize,
-    /// Box around every pixel with |d| above the threshold. `None` if there is none.
+    /// Box around all pixels with |d| above the threshold. `None` if there are none.
     pub bounding_box: Option<BoundingBox>,
 }
 
-/// A frame of the unpressed sensor, its noise and its sums, prepared once and compared with many
-/// frames.
+/// A frame of the unpressed sensor with its noise and sums. It is prepared once and compared with
+/// many frames.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -60,7 +60,7 @@ pub struct FrameStatistics {
 #[derive(Clone, Debug)]
 pub struct ReferenceFrame {
     image: Array2<u8>,
-    /// The mean of several frames, finer than whole grey levels. One frame is its own.
+    /// The mean of several frames, not rounded. `None` for a single frame.
     mean: Option<Array2<f32>>,
     frames: usize,
     noise: NoiseModel,
@@ -68,41 +68,43 @@ pub struct ReferenceFrame {
     /// Σ of the image.
     sum: i64,
     tiles: Tiles,
-    /// Places, pixels and sums of all tiles, for frames that differ nowhere.
+    /// Positions, pixels and sums of all tiles, used for frames equal to the reference.
     blank: Vec<TileSum>,
 }
 
 /// Buffers of the pass.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PassWorkspace {
-    /// Σ (frame − reference) of every tile.
+    /// Σ (frame − reference) for each tile.
     pub tiles: Tiles,
     /// A copy of frames that are not in standard layout.
     copy: Vec<u8>,
-    /// Eight rows at work.
+    /// The eight rows in progress.
     band: Vec<u8>,
 }
 
 impl ReferenceFrame {
-    /// From one frame. Its noise is estimated from its second differences in both directions.
+    /// Creates a reference from one frame. Its noise is estimated from its second differences in
+    /// both directions.
     ///
     /// # Errors
-    /// An empty image, or a side longer than 16384 pixels.
+    /// An error for an empty image, or a side longer than 16384 pixels.
     pub fn new(image: ArrayView2<'_, u8>) -> Result<Self, ForceError> {
         Self::from_frames(&[image])
     }
 
-    /// From the mean of several frames of the unpressed sensor: its own noise falls with their
-    /// number, and the noise of a frame is that of each pixel from frame to frame, whatever the
-    /// texture of the image.
+    /// Creates a reference from the mean of several frames of the unpressed sensor. The noise of
+    /// the mean decreases with their number, and the noise of a frame is measured from the changes
+    /// of each pixel, independently of the texture of the image.
     ///
     /// # Errors
-    /// No frame, an empty one, a side longer than 16384 pixels, or frames that differ in size.
+    /// An error for no frame, an empty frame, a side longer than 16384 pixels, or frames that
+    /// differ in size.
     pub fn from_frames(frames: &[ArrayView2<'_, u8>]) -> Result<Self, ForceError> {
         let size = common_size(frames)?;
         let mean = (frames.len() > 1).then(|| mean_of(frames, size));
-        // To the nearest, halves upwards: exact, and the standard library's rounding is a function
-        // call a pixel.
+        // Rounded to the nearest integer, halves upwards. This is exact; the standard library's
+        // rounding is a function call per pixel.
         let image = match &mean {
             None => frames[0].as_standard_layout().into_owned(),
             Some(mean) => mean.mapv(|m| (f64::from(m) + 0.5) as u8),
@@ -131,14 +133,15 @@ impl ReferenceFrame {
         })
     }
 
-    /// Corrects every difference for vignetting: divides it by the brightness that the reference
-    /// itself has there, relative to the frame's middle, smoothed to a quadratic. A calibration
-    /// then holds wherever the contact lies.
+    /// Corrects all differences for vignetting: divides them by the local brightness of the
+    /// reference, relative to the centre of the frame and smoothed to a quadratic. A calibration is
+    /// then valid for any position of the contact.
     ///
-    /// Right where stray light and signal come through the same lens.
+    /// This is correct if stray light and signal come through the same lens.
     ///
     /// # Errors
-    /// The reference is too dark to show vignetting: its mean is below one grey level.
+    /// An error if the reference is too dark to reveal vignetting: its mean is below one grey
+    /// level.
     ///
     /// ```
     /// use ndarray::Array2;
@@ -148,7 +151,7 @@ impl ReferenceFrame {
     /// assert!(even.flat_field().is_none());
     /// let coefficients = even.with_flat_field()?.flat_field().expect("asked for").coefficients;
     /// assert!(coefficients[0] == 1.0 && coefficients[1..].iter().all(|c| c.abs() < 1e-9));
-    /// // A black reference shows no vignetting.
+    /// // A black reference reveals no vignetting.
     /// assert!(ReferenceFrame::new(Array2::zeros((80, 120)).view())?.with_flat_field().is_err());
     /// # Ok::<(), tactile_force::ForceError>(())
     /// ```
@@ -168,12 +171,12 @@ impl ReferenceFrame {
         Ok(self)
     }
 
-    /// The correction for vignetting, if it was asked for.
+    /// The correction for vignetting. `None` if it was not requested.
     pub fn flat_field(&self) -> Option<FlatField> {
         self.flat
     }
 
-    /// The image. The mean of several frames, rounded.
+    /// The image. For several frames it is the rounded mean.
     pub fn image(&self) -> ArrayView2<'_, u8> {
         self.image.view()
     }
@@ -183,10 +186,10 @@ impl ReferenceFrame {
         self.noise
     }
 
-    /// Compares a frame with the reference: one pass over both, O(pixels), exact.
+    /// Compares a frame with the reference, exactly and in one pass over both. O(pixels).
     ///
     /// # Errors
-    /// The frame has not the reference's size.
+    /// An error if the size of the frame differs from that of the reference.
     ///
     /// ```
     /// use ndarray::Array2;
@@ -209,7 +212,7 @@ impl ReferenceFrame {
         Ok(self.compare_with(&mut PassWorkspace::default(), frame, threshold))
     }
 
-    /// The pass proper. The frame has the reference's size.
+    /// The pass itself. The frame must have the size of the reference.
     pub(crate) fn compare_with(
         &self,
         workspace: &mut PassWorkspace,
@@ -266,9 +269,9 @@ impl ReferenceFrame {
         self.sum as f64 / self.image.len() as f64
     }
 
-    /// Variance of one pixel's difference frame − reference where nothing presses.
+    /// Variance of one pixel's difference frame − reference outside contacts.
     pub(crate) fn difference_variance(&self) -> f64 {
-        // One frame's variance and the mean's, which is a share 1/n of it.
+        // The variance of one frame plus that of the mean, which is 1/n of it.
         self.own_variance() * (self.frames as f64 + 1.0)
     }
 
@@ -277,7 +280,7 @@ impl ReferenceFrame {
         self.noise.variance(self.mean_grey()) / self.frames as f64
     }
 
-    /// Every tile of the last pass. `None` if that was of a frame of another size, or none.
+    /// All tiles of the last pass. `None` if there was none, or if its frame had another size.
     pub(crate) fn tile_sums<'a>(
         &'a self,
         passed: &'a Tiles,
@@ -311,14 +314,14 @@ impl ReferenceFrame {
     }
 }
 
-/// The grey levels of a reference: those of one frame, or the mean of several.
+/// The grey levels of a reference: a single frame, or the mean of several.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Levels<'a> {
     Whole(ArrayView2<'a, u8>),
     Fine(ArrayView2<'a, f32>),
 }
 
-/// The size that all frames have.
+/// The common size of all frames.
 fn common_size(frames: &[ArrayView2<'_, u8>]) -> Result<(usize, usize), ForceError> {
     let size = frames.first().map_or((0, 0), |f| f.dim());
     let (rows, columns) = size;
@@ -349,12 +352,13 @@ fn mean_of(frames: &[ArrayView2<'_, u8>], size: (usize, usize)) -> Array2<f32> {
     })
 }
 
-/// The tiles' sums from the mean of several frames, which is finer than whole grey levels.
+/// The sums of the tiles from the mean of several frames, which is not rounded.
 fn sum_means(mean: ArrayView2<'_, f32>, tiles: &mut Tiles) {
     for tile in 0..tiles.sums.len() {
         let pixels = tiles.pixels(tile, mean.dim()).of(mean);
         let sum: f64 = pixels.iter().map(|m| f64::from(*m)).sum();
-        // Rounded after the summing: half a grey level at most in a sum of 256 pixels.
+        // Rounded after the summation: an error of at most half a grey level in a sum of 256
+        // pixels.
         tiles.sums[tile] = sum.round() as i32;
     }
 }

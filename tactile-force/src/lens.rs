@@ -1,5 +1,5 @@
-//! Camera geometry: from pixels to metres on the sensor's surface, with radial distortion and
-//! pixels that are not square, and its fit to a dot target.
+//! Camera geometry: from pixels to metres on the surface of the sensor, with radial distortion and
+//! non-square pixels, and its fit to a dot target.
 
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 use tactile_core::{Estimate, Requirement, StopReason};
@@ -14,14 +14,14 @@ use crate::error::ForceError;
 /// X = h_x (c_x + u s), Y = h_y (c_y + v s), s = 1 + k₁ρ² + k₂ρ⁴
 ///
 /// (D. C. Brown, "Decentering distortion of lenses", 1966, without its tangential terms). R is a
-/// length in pixels, half the frame's diagonal by custom, which makes k₁ and k₂ numbers: the share
-/// by which the corners are moved. Barrel distortion of the image has k₁ > 0, pincushion k₁ < 0.
-/// Without distortion a place is its pixel times the pixel's size.
+/// length in pixels, by convention half the diagonal of the frame, so that k₁ and k₂ are the
+/// relative displacements of the corners. Barrel distortion of the image has k₁ > 0, pincushion
+/// distortion k₁ < 0. Without distortion a position is the pixel times the pixel size.
 ///
 /// ```
 /// use tactile_force::LensGeometry;
 ///
-/// // The corners of a frame of 1392 × 1042 pixels appear 3 % too close to its middle.
+/// // The corners of a frame of 1392 × 1042 pixels appear 3 % too close to its centre.
 /// let plain = LensGeometry::new([21.6e-6, 22.0e-6])?;
 /// let lens = plain.with_distortion([695.5, 520.5], 869.0, [0.03, 0.0])?;
 /// assert_eq!((lens.pixel_size_m(), lens.distortion()), ([21.6e-6, 22.0e-6], [0.03, 0.0]));
@@ -45,7 +45,7 @@ pub struct LensGeometry {
     distortion: [f64; 2],
 }
 
-/// A geometry as a file has it.
+/// A geometry as stored in a file.
 #[cfg(feature = "serde")]
 #[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -69,24 +69,24 @@ impl TryFrom<Unchecked> for LensGeometry {
     }
 }
 
-/// Points of a contour that is undistorted.
+/// Number of contour points that are undistorted.
 const DIRECTIONS: usize = 16;
-/// Radius of the ring, as a share of the contact's, on which a quadratic has the mean that it has
-/// over Hertz's pressure: √0.4.
+/// Radius of the ring, relative to the contact, on which a quadratic has the same mean as over
+/// Hertz's pressure: √0.4.
 const HERTZ_RADIUS: f64 = 0.632_455_532_033_675_9;
 
 /// Value and derivatives of the map at a pixel.
 struct Local {
     metres: [f64; 2],
-    /// ∂(X, Y)/∂(u, v), row by row.
+    /// ∂(X, Y)/∂(u, v), by rows.
     jacobian: [[f64; 2]; 2],
 }
 
 impl LensGeometry {
-    /// A lens without distortion and pixels of the given size [x, y] in metres.
+    /// A lens without distortion, with pixels of the given size [x, y] in metres.
     ///
     /// # Errors
-    /// A size that is not positive and finite.
+    /// An error for a size that is not positive and finite.
     pub fn new(pixel_size_m: [f64; 2]) -> Result<Self, ForceError> {
         for size in pixel_size_m {
             Requirement::Positive.check("pixel_size_m", size)?;
@@ -99,11 +99,12 @@ impl LensGeometry {
         })
     }
 
-    /// Adds radial distortion [k₁, k₂] about a centre [x, y], normalised by `radius_px`.
+    /// Sets radial distortion [k₁, k₂] about a centre [x, y], normalised by `radius_px`.
     ///
     /// # Errors
-    /// A centre or coefficient that is not finite, a radius that is not positive, or a distortion
-    /// that folds the image within the radius: 1 + 3k₁ρ² + 5k₂ρ⁴ must stay positive up to ρ = 1.
+    /// An error for a centre or coefficient that is not finite, a radius that is not positive, or a
+    /// distortion that folds the image inside the radius: 1 + 3k₁ρ² + 5k₂ρ⁴ must be positive up to
+    /// ρ = 1.
     pub fn with_distortion(
         mut self,
         centre_px: [f64; 2],
@@ -116,7 +117,7 @@ impl LensGeometry {
         Requirement::Positive.check("radius_px", radius_px)?;
         Requirement::Finite.check("k1", k1)?;
         Requirement::Finite.check("k2", k2)?;
-        // The slope is a parabola in ρ²: its least value on [0, 1] lies at an end or at its vertex.
+        // The slope is a parabola in ρ²: its minimum on [0, 1] is at an end or at its vertex.
         let slope = |t: f64| 1.0 + t * (3.0 * k1 + t * 5.0 * k2);
         let vertex = if k2 == 0.0 {
             1.0
@@ -143,28 +144,28 @@ impl LensGeometry {
         self.distortion
     }
 
-    /// The undistorted place [X, Y] of a pixel [x, y], in metres from where the first pixel would
-    /// be without distortion.
+    /// The undistorted position [X, Y] of a pixel [x, y], in metres from the undistorted position
+    /// of the first pixel.
     pub fn to_metres(&self, pixel: [f64; 2]) -> [f64; 2] {
         self.local(pixel).metres
     }
 
-    /// Distances [x, y] in metres that one pixel step covers at a pixel: h_x and h_y without
+    /// Distances [x, y] in metres between neighbouring pixels at a position: h_x and h_y without
     /// distortion.
     pub(crate) fn pixel_step_m(&self, pixel: [f64; 2]) -> [f64; 2] {
         let [[xu, xv], [yu, yv]] = self.local(pixel).jacobian;
         [xu.hypot(yu), xv.hypot(yv)]
     }
 
-    /// Area in square metres that a pixel covers: dS of (6).
+    /// Area in square metres covered by a pixel: dS of (6).
     pub fn pixel_area_m2(&self, pixel: [f64; 2]) -> f64 {
         let [[xu, xv], [yu, yv]] = self.local(pixel).jacobian;
         (xu * yv - xv * yu).abs()
     }
 
-    /// Mean area of a pixel over a ball's contact around a centre [x, y], weighted with Hertz's
-    /// pressure: right to second order in the contact's radius. dS of (6) for a contact that is not
-    /// small beside the frame.
+    /// Mean pixel area over a ball's contact around a centre [x, y], weighted by Hertz's pressure
+    /// and accurate to second order in the contact radius. It is dS of (6) for a contact that is
+    /// not small compared with the frame.
     ///
     /// ```
     /// use tactile_force::LensGeometry;
@@ -182,9 +183,9 @@ impl LensGeometry {
         ring.map(|p| self.pixel_area_m2(p)).iter().sum::<f64>() / DIRECTIONS as f64
     }
 
-    /// Undistorted centre [X, Y] and radius, in metres, of a contact seen as a circle of
-    /// `radius_px` pixel widths where pixels are `aspect` times as high as wide: the radius is that
-    /// of the circle of the undistorted contour's area.
+    /// Undistorted centre [X, Y] and radius, in metres, of a contact that appears as a circle of
+    /// `radius_px` pixel widths, for pixels `aspect` times as high as wide. The radius is that of a
+    /// circle with the area of the undistorted contour.
     pub(crate) fn contact_m(
         &self,
         centre_px: [f64; 2],
@@ -192,7 +193,7 @@ impl LensGeometry {
         aspect: f64,
     ) -> ([f64; 2], f64) {
         let (mut centre, mut weights) = ([0.0; 2], 0.0);
-        // Weighted with the area of a pixel, so that the mean is one over the surface, not over the
+        // Weighted by the pixel area, so that the mean is over the surface rather than over the
         // image.
         for pixel in Self::ring(centre_px, HERTZ_RADIUS * radius_px, aspect) {
             let (place, weight) = (self.to_metres(pixel), self.pixel_area_m2(pixel));
@@ -203,7 +204,8 @@ impl LensGeometry {
         let contour = Self::ring(centre_px, radius_px, aspect).map(|p| self.to_metres(p));
         let ends = (0..DIRECTIONS).map(|k| [contour[k], contour[(k + 1) % DIRECTIONS]]);
         let twice_area: f64 = ends.map(|[a, b]| a[0] * b[1] - b[0] * a[1]).sum();
-        // A regular polygon with n corners on a circle has n sin(2π/n)/2 of its squared radius.
+        // A regular polygon with n corners on a circle has an area of n sin(2π/n)/2 times the
+        // squared radius.
         let turn = std::f64::consts::TAU / DIRECTIONS as f64;
         let radius = (twice_area / (DIRECTIONS as f64 * turn.sin())).sqrt();
         (centre.map(|c| c / weights), radius)
@@ -241,7 +243,7 @@ impl LensGeometry {
     }
 }
 
-/// A dot of a target: where the camera sees it, and where the target's drawing has it.
+/// A dot of a target: its position in the image and in the drawing of the target.
 ///
 /// ```
 /// use tactile_force::DotPair;
@@ -254,7 +256,7 @@ impl LensGeometry {
 pub struct DotPair {
     /// Centroid [x, y] of the dot in the frame, in pixels.
     pub pixel: [f64; 2],
-    /// Place [x, y] of the dot on the target, in metres from any origin.
+    /// Position [x, y] of the dot on the target, in metres from any origin.
     pub target_m: [f64; 2],
 }
 
@@ -265,7 +267,7 @@ pub struct DotPair {
 ///
 /// let truth =
 ///     LensGeometry::new([20e-6, 21e-6])?.with_distortion([159.5, 119.5], 199.3, [0.04, 0.002])?;
-/// // 9 × 7 dots on a target turned by 20 mrad.
+/// // 9 × 7 dots on a target rotated by 20 mrad.
 /// let (sin, cos) = 0.02_f64.sin_cos();
 /// let mut dots = Vec::new();
 /// for k in 0..63 {
@@ -294,27 +296,28 @@ pub struct LensFit {
     pub covariance: [[f64; 4]; 4],
     /// Standard deviation of a dot's residual along one axis, in pixels.
     pub residual_sd_px: f64,
-    /// Gauss–Newton steps taken.
+    /// Number of Gauss–Newton steps.
     pub iterations: usize,
     /// Why the fit stopped.
     pub stop: StopReason,
 }
 
-/// Parameters: h_x, h_y, k₁, k₂, and the target's pose: angle and shift.
+/// Parameters: h_x, h_y, k₁, k₂, and the pose of the target (angle and translation).
 const PARAMETERS: usize = 7;
 type Normal = SMatrix<f64, PARAMETERS, PARAMETERS>;
 type Vector = SVector<f64, PARAMETERS>;
 
-/// Fewest dots: 14 coordinates for 7 parameters leave as many degrees of freedom as parameters.
+/// Minimum number of dots: 14 coordinates for 7 parameters leave as many degrees of freedom as
+/// parameters.
 const FEWEST_DOTS: usize = 7;
 const MAX_STEPS: usize = 50;
 
 impl LensFit {
-    /// Least squares on the undistorted places of the dots: pixel sizes, k₁, k₂ about the frame's
-    /// middle, and the pose of the target, which may be mirrored. O(dots).
+    /// Least-squares fit to the undistorted positions of the dots: pixel sizes, k₁ and k₂ about the
+    /// centre of the frame, and the pose of the target, which may be mirrored. O(dots).
     ///
     /// # Errors
-    /// Fewer than seven dots, one that is not finite, or dots on a line.
+    /// An error for fewer than seven dots, a dot that is not finite, or dots on a line.
     pub fn from_dots(
         dots: &[DotPair],
         (rows, columns): (usize, usize),
@@ -347,7 +350,8 @@ impl LensFit {
                 .ok_or(ForceError::DegeneratePairs { span: 0.0 })?;
             parameters += step;
             state = problem.assemble(&parameters);
-            // Steps in units of the parameters' own size: metres and angles have none in common.
+            // Steps are compared with the scale of each parameter, because metres and angles have
+            // no common unit.
             if step.component_div(&state.scale()).amax() < 1e-11 {
                 stop = StopReason::Converged;
                 break;
@@ -361,11 +365,11 @@ struct Problem<'a> {
     dots: &'a [DotPair],
     centre: [f64; 2],
     radius: f64,
-    /// −1 where the target's y runs against the frame's.
+    /// −1 if the y axis of the target is opposite to that of the frame.
     mirror: f64,
 }
 
-/// Normal equations.
+/// Normal equations of the fit.
 struct Equations {
     normal: Normal,
     gradient: Vector,
@@ -373,14 +377,14 @@ struct Equations {
 }
 
 impl Equations {
-    /// The size of a parameter that moves the dots by their extent.
+    /// The change of each parameter that moves the dots by their extent.
     fn scale(&self) -> Vector {
         let largest = self.normal[(5, 5)].max(self.normal[(6, 6)]);
         self.normal.diagonal().map(|d| (largest / d).sqrt())
     }
 
-    /// The Gauss–Newton step, with columns scaled to unit length: parameters differ by ten orders
-    /// of magnitude.
+    /// The Gauss–Newton step, with columns scaled to unit length, because the parameters differ by
+    /// ten orders of magnitude.
     fn step(&self) -> Option<Vector> {
         let inverse = self.inverse()?;
         Some(inverse * self.gradient)
@@ -392,7 +396,7 @@ impl Equations {
             return None;
         }
         let scaled = Normal::from_fn(|i, j| self.normal[(i, j)] / (length[i] * length[j]));
-        // Dots on a line leave the scaled matrix singular to rounding.
+        // For dots on a line the scaled matrix is singular to rounding.
         let cholesky = scaled.cholesky()?;
         if cholesky.l_dirty().diagonal().min() < 1e-7 {
             return None;
@@ -405,11 +409,11 @@ impl Equations {
 }
 
 impl Problem<'_> {
-    /// Sizes and pose from the affine map pixel → target, no distortion.
+    /// Pixel sizes and pose from the affine map pixel → target, without distortion.
     fn start(&mut self) -> Result<Vector, ForceError> {
         let (mut normal, mut right) = (Matrix3::zeros(), [Vector3::zeros(); 2]);
         for dot in self.dots {
-            // Places from −1 to 1 keep the normal equations well conditioned.
+            // Positions from −1 to 1 give the normal equations a good condition number.
             let u = (dot.pixel[0] - self.centre[0]) / self.radius;
             let v = (dot.pixel[1] - self.centre[1]) / self.radius;
             let row = Vector3::new(u, v, 1.0);
@@ -430,7 +434,7 @@ impl Problem<'_> {
         }
         let affine = Matrix2::new(1.0, 0.0, 0.0, self.mirror) * affine;
         let sizes = [affine.column(0).norm(), affine.column(1).norm()];
-        // The target turned by −angle lies along the frame's axes.
+        // The target rotated by −angle is aligned with the axes of the frame.
         let angle = -affine[(1, 0)].atan2(affine[(0, 0)]);
         let middle = Vector2::new(x[2], self.mirror * y[2]);
         let (sin, cos) = angle.sin_cos();
@@ -447,7 +451,8 @@ impl Problem<'_> {
         ]))
     }
 
-    /// Residuals (pose of the target − place of the pixel) and their derivatives by all parameters.
+    /// Residuals (pose of the target − position of the pixel) and their derivatives by all
+    /// parameters.
     fn assemble(&self, parameters: &Vector) -> Equations {
         let [hx, hy, k1, k2, angle, tx, ty] = parameters.data.0[0];
         let (sin, cos) = angle.sin_cos();
@@ -466,8 +471,8 @@ impl Problem<'_> {
             let (x, y) = (dot.target_m[0], self.mirror * dot.target_m[1]);
             let turned = [cos * x - sin * y, sin * x + cos * y];
             let seen = [hx * (self.centre[0] + u * s), hy * (self.centre[1] + v * s)];
-            // Derivatives of the residual with the sign turned. By the angle a turned place changes
-            // by (−y, x).
+            // Derivatives of the negative residual. The derivative of a rotated position by the
+            // angle is (−y, x).
             let along_x = Vector::from([
                 self.centre[0] + u * s + hx * u * slope * rho2_by_hx,
                 hx * u * slope * rho2_by_hy,

@@ -1,10 +1,10 @@
 #![doc = include_str!("../README.md")]
 //!
 //! # Conventions
-//! Images are indexed `[row, column]`. X is the column, y the row, and (0, 0) is the centre of the
-//! first pixel. Physical quantities are SI and carry their unit in their names. Names that end in
-//! `_px` are in pixels. Equation numbers are those of the paper on waveguide tactile imaging that
-//! the workspace follows.
+//! Images are indexed `[row, column]`: x is the column, y the row, and (0, 0) is the centre of the
+//! first pixel. Physical quantities are in SI units, with the unit in their names. Names that end
+//! in `_px` are in pixels. Equation numbers are those of the paper on waveguide tactile imaging
+//! that the workspace follows.
 //!
 //! # Modules
 //! | module | contents |
@@ -21,7 +21,7 @@
 //!
 //! # Equations
 //! $d$ is the grey-level difference frame − reference, $V = \sum d$ the integrated pixel value.
-//! Numbers are the paper's.
+//! Equation numbers are those of the paper.
 //!
 //! - Stress and force (5), (6): $P = f(I)$ and $F_z = \int P dS$, that is $F_z = F(V)$ by
 //!   calibration.

@@ -1,4 +1,4 @@
-//! Measurement of force and contact in one frame.
+//! Force and contact of one frame.
 
 use ndarray::{Array2, ArrayView2};
 use tactile_core::{BoundingBox, Estimate, Polarity, Source, Uncertain};
@@ -14,7 +14,7 @@ use crate::profile::{HertzFit, HertzFitter, PixelVariance, Rings, Start, VARIANC
 use crate::region::Region;
 use crate::runs::Run;
 
-/// Measures forces with one sensor: options checked and tables built once.
+/// Measures forces with one sensor. Options are validated and tables are built once.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -46,10 +46,10 @@ pub struct ForceMeter {
 }
 
 impl ForceMeter {
-    /// A meter for pixels of the given size [x, y].
+    /// Creates a meter for pixels of the given size [x, y].
     ///
     /// # Errors
-    /// A pixel size that is not positive and finite.
+    /// An error for a pixel size that is not positive and finite.
     pub fn new(pixel_size_m: [f64; 2], options: &ForceOptions) -> Result<Self, ForceError> {
         Ok(Self {
             detector: ContactDetector::new(options.contact),
@@ -59,8 +59,8 @@ impl ForceMeter {
         })
     }
 
-    /// The same meter behind a lens that distorts: the contact's contour and centre are
-    /// undistorted, areas and stresses take the mean size of a pixel over the contact.
+    /// Adds a distorting lens: contour and centre of the contact are undistorted, and areas and
+    /// stresses use the mean pixel size over the contact.
     ///
     /// ```
     /// use tactile_force::{ForceMeter, LensGeometry};
@@ -76,8 +76,8 @@ impl ForceMeter {
         self
     }
 
-    /// The same meter without the fit of Hertz's profile, see [`ForceOptions::without_profile`]:
-    /// for contacts known to be no ball's.
+    /// Switches off the fit of Hertz's profile, see [`ForceOptions::without_profile`]. Use it for
+    /// contacts that are not those of a ball.
     ///
     /// ```
     /// use tactile_force::ForceMeter;
@@ -91,12 +91,13 @@ impl ForceMeter {
         self
     }
 
-    /// Measures one frame. A calibration with a [local curve](StressCalibration::local) turns the
-    /// contact's grey levels into pressures: the force is their integral, and the profile is fitted
-    /// to them.
+    /// Measures one frame. A calibration with a [local curve](StressCalibration::local) converts
+    /// the grey levels of the contact into pressures: the force is their integral, and the profile
+    /// is fitted to them.
     ///
     /// # Errors
-    /// The frame has not the reference's size, or too much of the contact is saturated.
+    /// An error if the size of the frame differs from that of the reference, or if too much of the
+    /// contact is saturated.
     pub fn measure_with(
         &self,
         workspace: &mut ForceWorkspace,
@@ -134,14 +135,14 @@ impl ForceMeter {
             profile = start
                 .and_then(|start| self.fitter.fit_with(rings, region, start, variance, sizes))
                 .map(|fit: HertzFit| match local.per_grey_pa() {
-                    // Back to grey levels, in which the fields of the fit are stated.
+                    // Converted back to grey levels, the unit of the fields of the fit.
                     Some(per_grey) => fit.with_levels_scaled(per_grey.recip()),
                     None => fit,
                 });
         }
-        // A part of an outline, or one that noise has frayed, does not show its shape.
+        // A partial or noisy outline does not reveal its shape.
         let whole = !contact.touches_edge && contact.other_contacts == 0;
-        // Peak over the noise of one pixel at which a contact's outline is sharp to a pixel.
+        // Ratio of peak to pixel noise above which the outline of a contact is sharp to one pixel.
         let clear = contact.peak > 20.0 * noise.background.sqrt();
         let elongation = (whole && clear)
             .then(|| elongation(&workspace.detector.region.mask, self.jacobian(&contact)))
@@ -152,7 +153,8 @@ impl ForceMeter {
         })
     }
 
-    /// Metres [x, y] for a step of one pixel along x and along y at a contact, in rows.
+    /// Displacements [x, y] in metres for a step of one pixel along x and along y at a contact, by
+    /// rows.
     fn jacobian(&self, contact: &Contact) -> [[f64; 2]; 2] {
         let [x, y] = contact.centroid_px.map(|c| c.value);
         let step = |from: [f64; 2], to: [f64; 2]| {
@@ -175,8 +177,8 @@ impl ForceMeter {
         }
     }
 
-    /// Where the fit of the profile starts, in pixels of the region. `integral` is in the units of
-    /// its levels.
+    /// Start values for the fit of the profile, in pixels of the region. `integral` is in the units
+    /// of the region's levels.
     fn start(
         &self,
         region: &Region,
@@ -189,7 +191,7 @@ impl ForceMeter {
         let [hx, hy] = pixel.step;
         Some(Start {
             centre: [x - place.column_start as f64, y - place.row_start as f64],
-            // From the radius of equal area in pixels to pixel widths.
+            // Converts the radius of equal area from pixels to pixel widths.
             radius: contact.equivalent_radius_px * (hy / hx).sqrt(),
             integral,
         })
@@ -213,8 +215,8 @@ impl ForceMeter {
             let undistorted = radius_m / profile.radius_m.value;
             profile.radius_m = profile.radius_m * undistorted;
         }
-        // Without a profile the mask's radius with half a pixel as its error, and the brightest
-        // pixel for the peak, taken as good to a grey level.
+        // Without a profile, the radius of the mask has an error of half a pixel, and the brightest
+        // pixel gives the peak with an error of one grey level.
         let side = pixel.area.sqrt();
         let of_mask = Estimate::new(contact.equivalent_radius_px * side, 0.5 * side);
         let radius = profile.map_or(of_mask.into(), |p| p.radius_m);
@@ -237,19 +239,19 @@ impl ForceMeter {
     }
 }
 
-/// Steps [x, y] of a pixel in metres, and its area.
+/// Pixel steps [x, y] in metres, and the pixel area.
 #[derive(Clone, Copy, Debug)]
 struct PixelSize {
     step: [f64; 2],
     area: f64,
 }
 
-/// Measures the force of one frame against one reference frame. For many frames keep a
+/// Measures the force of one frame against one reference frame. For many frames, keep a
 /// [`ForceMeter`], a [`ReferenceFrame`] and a [`ForceWorkspace`].
 ///
 /// # Errors
-/// Images of different size or without pixels, a pixel size that is not positive, too much of the
-/// contact saturated.
+/// An error for images of different size or without pixels, a pixel size that is not positive, or a
+/// contact that is too saturated.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -293,12 +295,12 @@ pub fn measure_force(
     )
 }
 
-/// The options of a force measurement.
+/// Options of a force measurement.
 ///
 /// ```
 /// use tactile_force::{ContactOptions, ForceMeter, ForceOptions, Polarity};
 ///
-/// // Force and centroid only, at one false alarm in a million frames.
+/// // Only force and centroid, at one false alarm in a million frames.
 /// let contact = ContactOptions::default().with_false_alarm_rate(1e-6)?;
 /// let options = ForceOptions::default().with_contact(contact).without_profile();
 /// assert_eq!(options.polarity(), Polarity::Brighter);
@@ -313,19 +315,19 @@ pub struct ForceOptions {
 }
 
 impl ForceOptions {
-    /// Finds the contact with these options.
+    /// Sets the options of contact detection.
     pub fn with_contact(mut self, contact: ContactOptions) -> Self {
         self.contact = contact;
         self
     }
 
-    /// Fits no profile: radius and peak stress then come from the mask.
+    /// Switches off the fit of the profile. Radius and peak stress then come from the mask.
     pub fn without_profile(mut self) -> Self {
         self.skip_profile = true;
         self
     }
 
-    /// Whether contact is brighter or darker than the reference.
+    /// Whether a contact is brighter or darker than the reference.
     pub fn polarity(&self) -> Polarity {
         self.contact.polarity
     }
@@ -347,7 +349,7 @@ impl ForceOptions {
 ///     &calibration,
 ///     &Default::default(),
 /// )?;
-/// // No contact is an answer, not an error.
+/// // The absence of contact is a result, not an error.
 /// assert_eq!((m.force_n.value, m.contact, m.mean_stress_pa), (0.0, None, None));
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
@@ -356,34 +358,34 @@ impl ForceOptions {
 pub struct ForceMeasurement {
     /// Normal force in newtons, equation (6). Zero without contact.
     pub force_n: Uncertain,
-    /// The force as it was read, and whether the calibration was used outside its range. `None`
-    /// without contact.
+    /// The reading of the force, which also states whether the calibration was used outside its
+    /// range. `None` without contact.
     pub reading: Option<ForceReading>,
-    /// The contact. `None` if the frame shows none.
+    /// The contact. `None` if there is none.
     pub contact: Option<Contact>,
-    /// The fitted Hertz profile, if it was asked for and could be fitted.
+    /// The fitted Hertz profile. `None` if it was not requested or could not be fitted.
     pub profile: Option<HertzFit>,
     /// Centroid [x, y] in metres from the centre of the first pixel, equations (7) and (8).
     pub centroid_m: Option<[Estimate; 2]>,
     /// Area of the mask in square metres.
     pub contact_area_m2: Option<f64>,
-    /// Contact radius in metres: the profile's, else the mask's equivalent radius with half a pixel
-    /// as its error.
+    /// Contact radius in metres: that of the profile, or otherwise the equivalent radius of the
+    /// mask with an error of half a pixel.
     pub contact_radius_m: Option<Uncertain>,
     /// F/(π a²) in pascals.
     pub mean_stress_pa: Option<Uncertain>,
-    /// Stress at the centre in pascals: the profile's peak, else the greatest difference, through
-    /// the calibration.
+    /// Stress at the centre in pascals: the calibrated peak of the profile, or otherwise the
+    /// calibrated largest difference.
     pub peak_stress_pa: Option<Uncertain>,
-    /// Longer over shorter half axis of the contact's outline, less one, where that stands out of
-    /// what whole pixels leave and exceeds 0.5 %: pixels that are not as stated, a lens that
-    /// distorts, or an object that is not round.
+    /// Longer over shorter half axis of the contact's outline, minus one. `None` unless it exceeds
+    /// 0.5 % and the effect of pixel discretisation. Possible reasons are misstated pixel sizes, a
+    /// distorting lens, or an object that is not round.
     pub elongation: Option<f64>,
     /// Sums over the whole frame.
     pub statistics: FrameStatistics,
     /// The correction of illumination and stray light.
     pub drift: IlluminationDrift,
-    /// The noise that the errors are computed from. `None` without contact.
+    /// The noise from which the errors are computed. `None` without contact.
     pub noise: Option<DifferenceNoise>,
 }
 
@@ -431,7 +433,7 @@ impl ForceMeasurement {
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct ForceWorkspace {
-    /// What the detector keeps of the last frame: mask, grey histogram and background.
+    /// Data of the last frame in the detector: mask, grey histogram and background.
     pub detector: DetectorWorkspace,
     rings: Rings,
     local: Local,
@@ -439,8 +441,8 @@ pub struct ForceWorkspace {
 
 impl ForceWorkspace {
     /// The pressure of the last contact in pascals over its region (zero outside the aperture), and
-    /// the region's place in the frame. `None` without contact, or if the calibration had no [local
-    /// curve](crate::StressCalibration::local). O(pixels of the region).
+    /// the position of the region in the frame. `None` without contact, or if the calibration had
+    /// no [local curve](crate::StressCalibration::local). O(pixels of the region).
     ///
     /// ```
     /// use ndarray::Array2;
@@ -449,7 +451,7 @@ impl ForceWorkspace {
     ///     ReferenceFrame,
     /// };
     ///
-    /// // 2 kPa a grey level.
+    /// // 2 kPa per grey level.
     /// let pixels = |grey: f32| std::iter::repeat_n(grey, 1000);
     /// let disc = |grey: f32| GreyHistogram::from_differences(pixels(grey), 4e-10);
     /// let frames: Vec<_> = [20.0_f32, 40.0, 60.0, 80.0, 100.0]
@@ -489,17 +491,17 @@ impl ForceWorkspace {
     }
 }
 
-/// Steps of a grey level at which the curve is tabulated and pixels are counted: rounding to a
-/// sixteenth adds 2 % to the smallest variance that a grey level can have, that of rounding to
-/// whole ones.
+/// Fraction of a grey level at which the curve is tabulated and pixels are counted. Rounding to a
+/// sixteenth adds 2 % to the smallest possible variance of a grey level, that of rounding to
+/// integers.
 const STEPS: usize = 16;
-/// Entries of the table, from −256 grey levels on.
+/// Number of entries of the table, starting at −256 grey levels.
 const TABLE: usize = 512 * STEPS + 1;
 const LEAST: f32 = -256.0;
-/// Pixels whose places in the table are computed at once, by SIMD instructions.
+/// Number of pixels whose table indices are computed together with SIMD instructions.
 const BLOCK: usize = 64;
 
-/// Force of a contact, and pascals per grey level of its integrated pixel value.
+/// Force of a contact, and the pascals per grey level of its integrated pixel value.
 #[derive(Clone, Copy, Debug)]
 struct Stress {
     reading: ForceReading,
@@ -507,8 +509,8 @@ struct Stress {
 }
 
 impl Stress {
-    /// Pascals per grey level with the error that the calibration gives the force. The noise of the
-    /// sum is not that of the peak.
+    /// Pascals per grey level, with the error of the force from the calibration. The noise of the
+    /// sum does not apply to the peak.
     fn per_grey(&self) -> Uncertain {
         let force_n = self.reading.force_n.without(Source::Noise);
         if force_n.value == 0.0 {
@@ -518,13 +520,13 @@ impl Stress {
     }
 }
 
-/// Buffers of the conversion, and its result for the last contact.
+/// Buffers of the conversion, with the result for the last contact.
 #[derive(Clone, Debug, Default)]
 struct Local {
     histogram: GreyHistogram,
-    /// f at every step.
+    /// f at each table step.
     table: Vec<f32>,
-    /// Pixels of the aperture at every step.
+    /// Number of aperture pixels at each table step.
     counts: Vec<u32>,
     converted: Option<Converted>,
 }
@@ -542,12 +544,12 @@ impl Local {
         self.converted = None;
     }
 
-    /// Pascals per grey level over the last contact, if it was converted.
+    /// Pascals per grey level over the last contact. `None` if it was not converted.
     fn per_grey_pa(&self) -> Option<f64> {
         self.converted.as_ref().map(|c| c.per_grey_pa)
     }
 
-    /// The variance of the pixels that the profile is fitted to.
+    /// The variance of the pixels to which the profile is fitted.
     fn variance<'a>(&'a self, noise: &'a DifferenceNoise) -> PixelVariance<'a> {
         match &self.converted {
             Some(c) => PixelVariance::Pressure {
@@ -558,8 +560,8 @@ impl Local {
         }
     }
 
-    /// Reads the force off the histogram of the aperture and turns the aperture's differences into
-    /// pressures.
+    /// Computes the force from the histogram of the aperture, and converts the differences of the
+    /// aperture into pressures.
     fn convert(
         &mut self,
         curve: &dyn LocalCalibration,
@@ -601,7 +603,7 @@ impl Local {
         })
     }
 
-    /// f at every step, linear between whole grey levels as a histogram has it.
+    /// f at each table step, linear between integer grey levels as in a histogram.
     fn tabulate(&mut self, curve: &dyn LocalCalibration) {
         self.table.clear();
         let whole = |grey: usize| curve.value_pa(f64::from(LEAST) + grey as f64);
@@ -616,8 +618,8 @@ impl Local {
         self.table.push(below as f32);
     }
 
-    /// Variance of a pressure, (slope over the noise)² σ², from zero to a fifth beyond the
-    /// contact's peak.
+    /// Variance of a pressure, (secant slope)² σ², from zero to a fifth above the peak of the
+    /// contact.
     fn variances(&self, noise: DifferenceNoise, peak: f64, per_grey_pa: f64) -> Converted {
         let pressure = |grey: f64| {
             let place = (place_of(grey as f32) as usize).min(TABLE - 1);
@@ -627,15 +629,17 @@ impl Local {
         let step = highest / (VARIANCE_LEVELS - 1) as f64;
         let mut grey = 0.0;
         let variance = std::array::from_fn(|k| {
-            // Levels rise, and so do the grey levels that they belong to.
+            // The levels are ascending, and so are the corresponding grey levels.
             while pressure(grey) < step * k as f64 && grey < 256.0 {
                 grey += 0.25;
             }
             let variance = noise.background + noise.gain * grey;
             let sd = variance.sqrt();
-            // A secant over the noise, not the tangent: within a pixel's noise the curve may bend.
+            // A secant over the noise instead of the tangent, because the curve may bend within the
+            // noise of a pixel.
             let slope = (pressure(grey + sd) - pressure(grey - sd)) / (2.0 * sd);
-            // A curve that is level over the noise has no less than a thousandth of the mean slope.
+            // If the curve is flat over the noise, the slope is at least a thousandth of the mean
+            // slope.
             slope.max(1e-3 * per_grey_pa).powi(2) * variance
         });
         Converted {
@@ -646,23 +650,23 @@ impl Local {
     }
 }
 
-/// The nearest step of a grey-level difference.
+/// The table step nearest to a grey-level difference.
 #[inline]
 fn place_of(difference: f32) -> u32 {
     ((difference.clamp(-255.0, 255.0) - LEAST) * STEPS as f32 + 0.5) as i32 as u32
 }
 
-/// The grey level of a step.
+/// The grey level of a table step.
 fn grey_at(place: usize) -> f64 {
     f64::from(LEAST) + place as f64 / STEPS as f64
 }
 
-/// Ratio of the longer to the shorter half axis of the mask's ellipse of inertia, less one; `None`
-/// where it does not stand out of what whole pixels leave. The Jacobian takes a step [x, y] in
+/// Ratio of the longer to the shorter half axis of the mask's ellipse of inertia, minus one. `None`
+/// if it does not exceed the effect of pixel discretisation. The Jacobian maps a step [x, y] in
 /// pixels to metres: [∂x, ∂y] in rows.
 ///
-/// An outline whose N = 2πa places are off by σ each has a second harmonic of σ √(2/N), and an
-/// elongation of twice that over a. O(rows of the mask).
+/// An outline with N = 2πa points, each with an independent error σ, has a second harmonic of σ
+/// √(2/N), and an elongation of twice that over a. O(rows of the mask).
 fn elongation(mask: &[Run], jacobian: [[f64; 2]; 2]) -> Option<f64> {
     let (mut n, mut x, mut y) = (0.0, 0.0, 0.0);
     for run in mask {
@@ -676,7 +680,8 @@ fn elongation(mask: &[Run], jacobian: [[f64; 2]; 2]) -> Option<f64> {
     for run in mask {
         let (len, middle) = pixels(run);
         let (u, v) = (middle - x, f64::from(run.row) - y);
-        // Pixels are squares, not points: a run has the second moment of a bar of its length.
+        // Pixels are squares rather than points: a run has the second moment of a bar of its
+        // length.
         xx += len * (u * u + len * len / 12.0);
         xy += len * u * v;
         yy += len * (v * v + 1.0 / 12.0);
@@ -690,15 +695,15 @@ fn elongation(mask: &[Run], jacobian: [[f64; 2]; 2]) -> Option<f64> {
     let half = (0.5 * (moved_xx - moved_yy)).hypot(moved_xy);
     let elongation = ((mean + half) / (mean - half)).sqrt() - 1.0;
     let radius_px = (n / std::f64::consts::PI).sqrt();
-    // Standard deviation of an outline's place in pixels: 1/√12 of a step of one pixel.
+    // Standard deviation of the outline's position in pixels: 1/√12 of a step of one pixel.
     let error = 2.0 * 0.29 / (radius_px * (std::f64::consts::PI * radius_px).sqrt());
-    // Elongation below which an outline counts as a circle: pixels that are not square by half a
-    // per cent change a ball's modulus by less than one. Standard errors by which an elongation
-    // must stand out.
+    // An outline counts as a circle below this elongation (pixels that deviate from squares by half
+    // a per cent change a ball's modulus by less than one per cent), or if the elongation is below
+    // this number of standard errors.
     (elongation > 5e-3_f64.max(4.0 * error)).then_some(elongation)
 }
 
-/// Number of a run's pixels, and its middle.
+/// Number of pixels of a run, and its centre.
 fn pixels(run: &Run) -> (f64, f64) {
     (
         run.len() as f64,

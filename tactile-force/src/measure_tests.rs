@@ -1,6 +1,6 @@
 use super::*;
 
-/// The mask of an ellipse with these half axes, turned by 30°.
+/// The mask of an ellipse with these half axes, rotated by 30°.
 fn ellipse(half: [f64; 2]) -> Vec<Run> {
     let (sin, cos) = std::f64::consts::FRAC_PI_6.sin_cos();
     let inside = |u: f64, v: f64| {
@@ -37,9 +37,9 @@ fn circles_of_every_size_are_round() {
 #[test]
 fn an_ellipse_is_found_with_its_axes_and_undone_by_its_pixels() {
     let found = elongation(&ellipse([92.0, 90.0]), SQUARE).unwrap();
-    // A tenth of what whole pixels may leave at this size.
+    // A tenth of the discretisation effect at this size.
     assert!((found - 2.0 / 90.0).abs() < 1e-3, "{found}");
-    // The Jacobian of pixels that squeeze the same ellipse to a circle.
+    // The Jacobian of pixels that map the same ellipse to a circle.
     let (sin, cos) = std::f64::consts::FRAC_PI_6.sin_cos();
     let (p, q) = (1.0 / 92.0, 1.0 / 90.0);
     let jacobian = [

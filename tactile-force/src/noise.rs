@@ -7,8 +7,9 @@ use crate::error::ForceError;
 
 /// Variance of one pixel of one frame: read variance + gain × grey level, in squared grey levels.
 ///
-/// The read variance includes the 1/12 of rounding to whole grey levels. The gain is the camera's:
-/// grey levels per photoelectron, so that the shot noise of a grey level g is gain × g.
+/// The read variance includes the 1/12 of rounding to integer grey levels. The gain is that of the
+/// camera, in grey levels per photoelectron: the variance of the shot noise at a grey level g is
+/// gain × g.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -17,7 +18,7 @@ use crate::error::ForceError;
 /// let camera = NoiseModel::new(1.5, 0.02)?;
 /// // 1.5² of reading, 1/12 of rounding, 0.02 × 100 of photons.
 /// assert!((camera.variance(100.0) - (2.25 + 1.0 / 12.0 + 2.0)).abs() < 1e-12);
-/// // An even image shows no noise but its rounding.
+/// // A uniform image shows no noise except rounding.
 /// let even = ReferenceFrame::new(Array2::from_elem((32, 32), 9).view())?;
 /// assert_eq!(even.noise().read_variance, 1.0 / 12.0);
 /// # Ok::<(), tactile_force::ForceError>(())
@@ -31,33 +32,33 @@ pub struct NoiseModel {
     pub gain: f64,
 }
 
-/// Variance of one pixel's difference frame − reference, background + gain × difference in squared
-/// grey levels, and the variances of errors that all pixels share.
+/// Variance of one pixel's difference frame − reference: background + gain × difference, in squared
+/// grey levels. Also the variances of errors common to all pixels.
 ///
 /// ```
 /// use tactile_force::DifferenceNoise;
 ///
 /// let noise = DifferenceNoise { gain: 0.02, ..DifferenceNoise::white(4.0) };
-/// // The variance of a pixel that contact has made 100 grey levels brighter.
+/// // The variance of a pixel that is 100 grey levels brighter in a contact.
 /// assert_eq!(noise.background + noise.gain * 100.0, 6.0);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DifferenceNoise {
-    /// Variance outside the contact, of frame and reference together.
+    /// Variance outside contacts, of frame and reference together.
     pub background: f64,
     /// Growth of the variance per grey level of difference.
     pub gain: f64,
-    /// Variance of a background error common to all pixels, from the correction of drift.
+    /// Variance of a background error common to all pixels, from the drift correction.
     pub common: f64,
-    /// Variance of a relative error of the whole signal, from the correction of illumination.
+    /// Variance of a relative error of the whole signal, from the illumination correction.
     pub scale: f64,
-    /// Variance of a relative error of the whole signal, from the correction for vignetting.
+    /// Variance of a relative error of the whole signal, from the vignetting correction.
     pub flat_field: f64,
 }
 
 impl DifferenceNoise {
-    /// The same variance for every pixel, in squared grey levels, and no error in common.
+    /// Equal variance for all pixels, in squared grey levels, without common errors.
     ///
     /// ```
     /// assert_eq!(tactile_force::DifferenceNoise::white(4.0).gain, 0.0);
@@ -74,14 +75,15 @@ impl DifferenceNoise {
     }
 }
 
-/// Variance of rounding to whole numbers.
+/// Variance of rounding to integers.
 pub(crate) const QUANTISATION: f64 = 1.0 / 12.0;
 
 impl NoiseModel {
-    /// From the standard deviation of the read noise (rounding excluded) and the gain.
+    /// Creates the model from the standard deviation of the read noise (without rounding) and the
+    /// gain.
     ///
     /// # Errors
-    /// Either is negative or not finite.
+    /// An error if either is negative or not finite.
     pub fn new(read_sd: f64, gain: f64) -> Result<Self, ForceError> {
         Requirement::NonNegative.check("read_sd", read_sd)?;
         Requirement::NonNegative.check("gain", gain)?;
@@ -98,9 +100,10 @@ impl NoiseModel {
 
     /// White noise of a frame without contact, from its second differences in both directions.
     ///
-    /// The response of [1 −2 1. −2 4 −2. 1 −2 1] has 36 times the variance of a pixel and none of a
-    /// quadratic background (Immerkær 1996). Responses beyond three standard deviations are left
-    /// out, again and again, and the variance of what stays is corrected for the cut tails.
+    /// The response of the filter [1 −2 1; −2 4 −2; 1 −2 1] has 36 times the variance of a pixel
+    /// and vanishes for a quadratic background (Immerkær 1996). Responses beyond three standard
+    /// deviations are dropped repeatedly, and the remaining variance is corrected for the truncated
+    /// tails.
     pub(crate) fn of_frame(frame: ArrayView2<'_, u8>) -> Self {
         let columns = frame.ncols();
         let mut counts = Counts::new();
@@ -128,7 +131,8 @@ impl NoiseModel {
         }
     }
 
-    /// White noise of repeated frames of one scene, from the changes of every pixel about its mean.
+    /// White noise from repeated frames of one scene, from the changes of each pixel about its
+    /// mean.
     pub(crate) fn of_repeats(frames: &[ArrayView2<'_, u8>], mean: ArrayView2<'_, f32>) -> Self {
         let mut squares = 0.0;
         for frame in frames {
@@ -153,7 +157,8 @@ pub(crate) fn widen<'a>(pixels: impl Iterator<Item = &'a u8>, levels: &mut [i16]
     }
 }
 
-/// Absolute responses of the middle one of three rows, of at least three pixels, without its ends.
+/// Absolute responses of the middle one of three rows, without its two ends. Rows have at least
+/// three pixels.
 #[inline(always)]
 pub(crate) fn respond<'a>(
     [above, here, below]: &[Vec<i16>; 3],
@@ -172,8 +177,8 @@ pub(crate) fn respond<'a>(
 /// Responses below this are counted in pairs.
 pub(crate) const SMALL: u16 = 64;
 
-/// Counts of a frame's responses. Two neighbours that are both small, as nearly all are, are
-/// counted in one place: half the writes, which are what counting waits for.
+/// Counts of a frame's responses. If two neighbours are both small, as nearly all are, they are
+/// counted in a joint bin. This halves the writes, which limit the speed.
 pub(crate) struct Counts {
     pairs: Vec<u32>,
     single: Vec<u32>,
@@ -183,8 +188,7 @@ impl Counts {
     pub(crate) fn new() -> Self {
         Self {
             pairs: vec![0; usize::from(SMALL).pow(2)],
-            // Absolute values that the response of a frame's second differences may have: up to 16
-            // × 255.
+            // Range of absolute responses of second differences: up to 16 × 255.
             single: vec![0; 4081],
         }
     }
@@ -206,7 +210,7 @@ impl Counts {
         }
     }
 
-    /// Responses of every absolute value.
+    /// Number of responses with each absolute value.
     pub(crate) fn histogram(&self) -> Vec<u64> {
         let mut counts: Vec<u64> = self.single.iter().map(|&n| u64::from(n)).collect();
         let small = usize::from(SMALL);
@@ -218,10 +222,9 @@ impl Counts {
     }
 }
 
-/// Variance of a normal sample given as a histogram of absolute values, with everything beyond 3 sd
-/// left out.
+/// Variance of a normal sample given as a histogram of absolute values, without values beyond 3 sd.
 pub(crate) fn trimmed_variance(histogram: &[u64]) -> f64 {
-    // Variance of a standard normal cut at ±3: 1 − 6 φ(3)/(2Φ(3) − 1).
+    // Variance of a standard normal truncated at ±3: 1 − 6 φ(3)/(2Φ(3) − 1).
     const CUT: f64 = 0.973_336_950_7;
     let mut variance = f64::INFINITY;
     for _ in 0..50 {
@@ -239,7 +242,7 @@ pub(crate) fn trimmed_variance(histogram: &[u64]) -> f64 {
             return 0.0;
         }
         let next = total / count / if variance.is_finite() { CUT } else { 1.0 };
-        // The variance only falls while tails are cut. The first that does not ends the cutting.
+        // Truncation only reduces the variance. The first value that is not smaller ends the loop.
         if next >= variance {
             break;
         }

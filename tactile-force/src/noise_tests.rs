@@ -1,6 +1,6 @@
 use super::{Counts, respond};
 
-/// Small and large responses, an odd number of them.
+/// An odd number of small and large responses.
 #[test]
 fn pairs_are_counted_like_single_responses() {
     let rows: [Vec<i16>; 2] = [

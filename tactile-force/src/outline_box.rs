@@ -1,4 +1,4 @@
-//! The box of the pixels that differ from the reference, tightened from tiles to pixels.
+//! The box of the pixels that differ from the reference, refined from tiles to pixels.
 
 use std::ops::Range;
 
@@ -13,7 +13,7 @@ pub(crate) struct Tiled<'a> {
     pub(crate) tiles: &'a Tiles,
 }
 
-/// A frame f beside its reference r, both of the same size (rows, columns).
+/// A frame f and its reference r, both of the same size (rows, columns).
 pub(crate) struct Pair<'a> {
     pub(crate) frame: Tiled<'a>,
     pub(crate) reference: Tiled<'a>,
@@ -29,7 +29,7 @@ impl Pair<'_> {
             if !self.may_exceed(here.clone(), threshold) {
                 return None;
             }
-            // Those between the outermost are not looked at.
+            // Tiles between the outermost ones are not examined.
             let first = here.find(|&tile| self.exceeds(tile, threshold))?;
             let last = here.rfind(|&tile| self.exceeds(tile, threshold));
             let last = last.unwrap_or(first);
@@ -51,7 +51,7 @@ impl Pair<'_> {
         let [f, r] = [self.frame.tiles, self.reference.tiles];
         let (dark, bright) = (f.darkest[tile], f.brightest[tile]);
         let (darkest, brightest) = (r.darkest[tile], r.brightest[tile]);
-        // The extremes of both images decide nearly all tiles without a look at their pixels.
+        // The extremes of both images decide most tiles without examining their pixels.
         let most = u8::max(
             bright.saturating_sub(darkest),
             brightest.saturating_sub(dark),
@@ -60,7 +60,7 @@ impl Pair<'_> {
         most > threshold && (least > threshold || self.difference(tile) > threshold)
     }
 
-    /// Whether |f − r| may exceed a threshold in some tiles.
+    /// Whether |f − r| may exceed a threshold in any of some tiles.
     pub(crate) fn may_exceed(&self, tiles: Range<usize>, threshold: u8) -> bool {
         let [f, r] = [self.frame.tiles, self.reference.tiles];
         let [dark, bright] = [&f.darkest[tiles.clone()], &f.brightest[tiles.clone()]];
@@ -68,7 +68,7 @@ impl Pair<'_> {
         excess(bright, darkest).max(excess(brightest, dark)) > threshold
     }
 
-    /// Greatest |f − r| of a tile.
+    /// Largest |f − r| in a tile.
     pub(crate) fn difference(&self, tile: usize) -> u8 {
         let at = self.frame.tiles.pixels(tile, self.size);
         let images = [self.frame.image, self.reference.image];
@@ -90,7 +90,7 @@ impl Pair<'_> {
     }
 }
 
-/// The greatest a − b of two lists of numbers, zero if negative.
+/// The largest a − b of two lists of numbers, zero if negative.
 pub(crate) fn excess(a: &[u8], b: &[u8]) -> u8 {
     vectorised(
         #[inline(always)]
@@ -110,8 +110,8 @@ pub(crate) fn excess(a: &[u8], b: &[u8]) -> u8 {
     )
 }
 
-/// Shrinks a box of whole tiles to the pixels with |frame − reference| > threshold. Both images lie
-/// in memory row by row.
+/// Shrinks a box of whole tiles to the pixels with |frame − reference| > threshold. Both images are
+/// row-major.
 pub(crate) fn tighten(
     mut tight: BoundingBox,
     images: [&[u8]; 2],
@@ -136,7 +136,7 @@ pub(crate) fn tighten(
             while tight.rows() > 1 && !is_over(tight.row_end - 1, &tight) {
                 tight.row_end -= 1;
             }
-            // Greatest |frame − reference| of every column of a strip, at most a tile wide.
+            // Largest |frame − reference| in each column of a strip, at most one tile wide.
             let greatest = |strip: Range<usize>| {
                 let mut greatest = [0_u8; TILE_COLUMNS];
                 for at in tight.row_start..tight.row_end {
@@ -147,7 +147,8 @@ pub(crate) fn tighten(
                 }
                 greatest.map(|level| level > threshold)
             };
-            // The outermost tile of a side has the pixel looked for, or the box had been smaller.
+            // The outermost tile on each side contains such a pixel; otherwise the box would be
+            // smaller.
             let (start, end) = (tight.column_start, tight.column_end);
             let width = (end - start).min(TILE_COLUMNS);
             if let Some(at) = greatest(start..start + width)[..width]

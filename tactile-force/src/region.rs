@@ -1,7 +1,8 @@
-//! The region of a frame around a contact: its differences, the mask and the aperture as runs of
-//! pixels, and the sums over them.
+//! The region of a frame around a contact: its differences, mask and aperture as runs of pixels,
+//! and the sums over them.
 //!
-//! Thresholding, labelling, filling and growing of runs cost as much as the outline, not the area.
+//! Thresholding, labelling, filling and dilation of runs cost time in proportion to the outline
+//! rather than the area.
 
 use std::ops::Range;
 
@@ -14,17 +15,17 @@ use crate::frame::{Levels, ReferenceFrame};
 use crate::noise::{DifferenceNoise, trimmed_variance};
 use crate::runs::{Components, Run, grow, push_runs};
 
-/// Differences over one box, row-major, and the contact in it as runs.
+/// Differences over one box, row-major, with its contact as runs.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Region {
     pub place: Option<BoundingBox>,
-    /// Corrected frame − reference, sign turned so that contact is positive.
+    /// Corrected frame − reference, with the sign chosen so that contact is positive.
     pub difference: Vec<f32>,
     /// The contact.
     pub mask: Vec<Run>,
-    /// The contact and a margin around it, over which sums run.
+    /// The contact with a margin, over which sums run.
     pub aperture: Vec<Run>,
-    /// The mask pixel by pixel, 1 inside.
+    /// The mask as pixels, 1 inside.
     pub pixels: Vec<u8>,
     components: Components,
     scratch: Vec<Run>,
@@ -32,11 +33,11 @@ pub(crate) struct Region {
     column_sums: Vec<f32>,
 }
 
-/// A mask's size.
+/// Size of a mask.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Extent {
     pub area: usize,
-    /// Other components that are not small.
+    /// Number of other components that are not small.
     pub others: usize,
 }
 
@@ -46,8 +47,8 @@ impl Region {
         self.place.map_or(1, |p| p.columns())
     }
 
-    /// Takes the differences inside a box, corrected for drift and vignetting, and returns the
-    /// greatest of them, zero if none is positive.
+    /// Loads the differences inside a box, corrected for drift and vignetting. Returns the largest
+    /// of them, or zero if none is positive.
     pub(crate) fn load(
         &mut self,
         frame: ArrayView2<'_, u8>,
@@ -57,7 +58,7 @@ impl Region {
         sign: f32,
     ) -> f32 {
         self.place = Some(place);
-        // Every pixel is written below.
+        // All pixels are written below.
         self.difference.resize(place.rows() * place.columns(), 0.0);
         let (first_column, flat) = (place.column_start, reference.flat_field());
         let lines = |y: usize| {
@@ -72,12 +73,12 @@ impl Region {
         }
     }
 
-    /// Thresholds the mean over a box of `width` pixels, keeps the largest component and fills its
-    /// holes.
+    /// Applies the threshold to the mean over a box of `width` pixels, keeps the largest component
+    /// and fills its holes.
     pub(crate) fn segment(&mut self, width: usize, limit: f32, notable: usize) -> Extent {
         let columns = self.columns();
         let rows = self.difference.len() / columns;
-        // Compared with sums instead of means, which spares a division a pixel.
+        // Compared with sums instead of means, which saves a division per pixel.
         let limit = limit * (width * width) as f32;
         let smooth = if width == 1 {
             &self.difference
@@ -111,7 +112,7 @@ impl Region {
         }
     }
 
-    /// Grows the mask to the aperture and paints the pixels.
+    /// Extends the mask to the aperture and paints the pixels.
     pub(crate) fn finish(&mut self, margin: usize) {
         let columns = self.columns();
         grow(
@@ -140,7 +141,7 @@ impl Region {
         ]
     }
 
-    /// Box of runs in frame coordinates.
+    /// Bounding box of runs in frame coordinates.
     pub(crate) fn bounds(&self, runs: &[Run]) -> Option<BoundingBox> {
         let place = self.place?;
         let boxes = runs.iter().map(|r| BoundingBox {
@@ -153,7 +154,7 @@ impl Region {
     }
 }
 
-/// Sums over a box of odd width centred at every pixel. Beyond the region there is nothing to add.
+/// Sums over a box of odd width centred at each pixel. Values outside the region are zero.
 fn box_sums(
     difference: &[f32],
     columns: usize,
@@ -183,7 +184,7 @@ fn box_sums(
                 .zip(row(y - half - 1))
                 .for_each(|(s, d)| *s -= d);
         }
-        // Sums of a window slide along rows and columns: the cost does not grow with its width.
+        // The window sums slide along rows and columns, so the cost does not depend on the width.
         let mut running: f32 = scratch[..half.min(columns)].iter().sum();
         for (x, sum) in sums[y * columns..(y + 1) * columns].iter_mut().enumerate() {
             running += scratch.get(x + half).copied().unwrap_or(0.0);
@@ -195,8 +196,8 @@ fn box_sums(
     }
 }
 
-/// Writes the differences of a box and returns the greatest of them, zero if none is positive.
-/// `lines` has the corrections along a row, `sign` is −1 where contact darkens.
+/// Writes the differences of a box. Returns the largest of them, or zero if none is positive.
+/// `lines` holds the corrections along each row, and `sign` is −1 if contact darkens.
 fn take<P: Copy + Into<f32>>(
     frame: ArrayView2<'_, u8>,
     levels: ArrayView2<'_, P>,
@@ -228,7 +229,7 @@ fn take<P: Copy + Into<f32>>(
     greatest
 }
 
-/// One row. The greatest difference is taken while the row is in the nearest cache.
+/// One row. The largest difference is computed while the row is in the first-level cache.
 struct Row<'a, P> {
     frame: &'a [u8],
     levels: &'a [P],
@@ -270,7 +271,7 @@ impl<P: Copy + Into<f32>> Loop for Row<'_, P> {
     }
 }
 
-/// Greatest of the values, zero if none is positive.
+/// Largest of the values, or zero if none is positive.
 pub(crate) fn greatest(values: &[f32]) -> f32 {
     vectorised(
         #[inline(always)]
@@ -288,7 +289,8 @@ fn greatest_of(values: &[f32]) -> f32 {
     lanes.iter().chain(rest).copied().fold(0.0, larger)
 }
 
-/// A comparison, which has a wide instruction. The first where the second is not a number.
+/// The larger of two values, or the first if the second is NaN. This comparison has a SIMD
+/// instruction.
 #[inline(always)]
 fn larger(a: f32, b: f32) -> f32 {
     if b > a { b } else { a }
@@ -301,14 +303,14 @@ pub(crate) struct NoiseWorkspace {
     bends: Vec<f32>,
 }
 
-/// Absolute responses of the second-difference filter, in whole grey levels.
+/// Number of absolute responses of the second-difference filter, in integer grey levels.
 const RESPONSES: usize = 4081;
 
-/// Variance per grey level: that of the pixels brighter than half the peak, by their second
-/// differences in both directions (as the reference's own noise, see [`crate::NoiseModel`]), less
-/// the background's, over their mean. The edge, where the signal itself bends, is darker. Of a
-/// large contact every n-th row and column is enough: 8 000 pixels give a variance to 2 %, a
-/// standard error to half of that.
+/// Gain of the noise: variance of the pixels brighter than half the peak, by their second
+/// differences in both directions (like the reference's own noise, see [`crate::NoiseModel`]),
+/// minus that of the background, over their mean. The edge, where the signal itself bends, is
+/// darker and not included. For a large contact every n-th row and column is enough: 8 000 pixels
+/// determine a variance to 2 %, and a standard error to half of that.
 pub(crate) fn gain(
     region: &Region,
     workspace: &mut NoiseWorkspace,
@@ -330,7 +332,7 @@ pub(crate) fn gain(
         if row == 0 || row + 1 >= rows || !every_row.contains(row) {
             continue;
         }
-        // The filter reaches one pixel to every side.
+        // The filter extends one pixel to each side.
         let inner = (run.start as usize).max(1)..(run.end as usize).min(columns - 1);
         if inner.is_empty() {
             continue;
@@ -349,14 +351,15 @@ pub(crate) fn gain(
                 }
             },
         );
-        // Walked by the iterator itself: a loop over two chained parts tests at every step which of
-        // them it is in.
+        // Uses internal iteration: a loop over two chained ranges would test at each step which
+        // range it is in.
         every_column.within(inner).for_each(|column| {
             let at = column - span.start;
             if here[at] > 0.5 * peak {
                 let [left, middle, right] = [bends[at - 1], bends[at], bends[at + 1]];
                 let response = (left - 2.0 * middle + right).abs();
-                // Rounds. `round` itself is a call where the processor is not known to have it.
+                // Rounds by hand. `round` is a function call if the code is compiled for older
+                // processors.
                 let bin = ((response + 0.5) as i32 as usize).min(RESPONSES - 1);
                 histogram[bin] += 1;
                 highest = bin.max(highest);
@@ -365,18 +368,18 @@ pub(crate) fn gain(
             }
         });
     }
-    // Fewer pixels do not show their noise.
+    // Fewer pixels do not reveal their noise.
     if count < 30 {
         return 0.0;
     }
     let seen = &histogram[..=highest];
-    // The filter has 36 times the variance of a pixel. What exceeds the background's grows with the
-    // signal.
+    // The filter response has 36 times the variance of a pixel. The excess over the background is
+    // proportional to the signal.
     ((trimmed_variance(seen) / 36.0 - background) * count as f64 / signal).max(0.0)
 }
 
-/// Every n-th number of a range, counted from its middle to both sides: the same rows and columns
-/// of a contact whichever way the image is mirrored, turned or moved.
+/// Every n-th number of a range, counted from its middle to both sides: the rows and columns of a
+/// contact are then the same if the image is mirrored, rotated or shifted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EveryNth {
     /// The middle of the range, rounded down and up.
@@ -386,7 +389,7 @@ pub(crate) struct EveryNth {
 }
 
 impl EveryNth {
-    /// Of a range that is not empty.
+    /// Creates the selection from a non-empty range.
     pub(crate) fn of(range: Range<usize>, step: usize) -> Self {
         let ends = range.start + range.end.saturating_sub(1);
         Self {
@@ -396,7 +399,7 @@ impl EveryNth {
         }
     }
 
-    /// Whether a number is one of them.
+    /// Whether a number is selected.
     pub(crate) fn contains(&self, at: usize) -> bool {
         let away = if at <= self.low {
             self.low - at
@@ -406,13 +409,13 @@ impl EveryNth {
         away.is_multiple_of(self.step)
     }
 
-    /// Those within a range, in order.
+    /// The selected numbers within a range, in order.
     #[inline]
     pub(crate) fn within(&self, range: Range<usize>) -> impl Iterator<Item = usize> {
         let step = self.step;
         let first = range.start + self.low.saturating_sub(range.start) % step;
         let down = (first..range.end.min(self.low + 1)).step_by(step);
-        // Where both middles are one, it is counted once.
+        // If both middles coincide, they are counted once.
         let above = if self.low == self.high {
             self.high + step
         } else {
@@ -423,23 +426,23 @@ impl EveryNth {
     }
 }
 
-/// Sums over the aperture. Coordinates are relative to the region's first pixel.
+/// Sums over the aperture. Coordinates are relative to the first pixel of the region.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Sums {
     /// Number of pixels and their moments: 1, x, y, x², y².
     pub plain: [f64; 5],
-    /// The same weighted with the difference.
+    /// The same moments weighted by the difference.
     pub weighted: [f64; 5],
 }
 
 impl Sums {
-    /// `columns` is scratch.
+    /// Computes the sums. `columns` is working memory.
     pub(crate) fn over(region: &Region, columns: &mut Vec<f64>) -> Self {
         let mut plain = [0.0; 5];
         for run in &region.aperture {
             let (y, n) = (f64::from(run.row), run.len() as f64);
             let (first, last) = (f64::from(run.start), f64::from(run.end) - 1.0);
-            // Σ x and Σ x² of consecutive whole numbers.
+            // Σ x and Σ x² of consecutive integers.
             let cubes = |t: f64| t * (t + 1.0) * (2.0 * t + 1.0) / 6.0;
             let terms = [
                 n,
@@ -478,19 +481,19 @@ impl Sums {
         ]
     }
 
-    /// Variance of Σ d: every pixel's, and that of errors of background and scale common to all,
-    /// which go together.
+    /// Variance of Σ d: from the noise of each pixel and from the common errors of background and
+    /// scale, which are fully correlated.
     pub(crate) fn variance(&self, noise: &DifferenceNoise) -> f64 {
-        // Own noise adds by squares. Errors of background and scale have one cause and add before
-        // squaring.
+        // Independent noise adds in squares. Errors of background and scale have one cause, so they
+        // are added before squaring.
         noise.background * self.plain[0]
             + noise.gain * self.weighted[0].max(0.0)
             + (noise.common.sqrt() * self.plain[0] + noise.scale.sqrt() * self.weighted[0]).powi(2)
             + noise.flat_field * self.weighted[0] * self.weighted[0]
     }
 
-    /// Variance of the centroid along x (0) or y (1): Σ var(d) (x − x̄)²/(Σ d)², and the common
-    /// error's lever.
+    /// Variance of the centroid along x (0) or y (1): Σ var(d) (x − x̄)²/(Σ d)², plus the effect of
+    /// the common error.
     pub(crate) fn centroid_variance(&self, axis: usize, noise: &DifferenceNoise) -> f64 {
         let at = self.centroid()[axis];
         let about = |s: &[f64; 5]| s[3 + axis] - 2.0 * at * s[1 + axis] + at * at * s[0];
@@ -502,8 +505,8 @@ impl Sums {
     }
 }
 
-/// Σ d of every column of the aperture, and Σ d, Σ y d, Σ y² d: moments need no product for every
-/// pixel.
+/// Σ d for each column of the aperture, and Σ d, Σ y d, Σ y² d. With these, moments need no product
+/// per pixel.
 struct Moments<'a> {
     region: &'a Region,
     columns: &'a mut [f64],
@@ -521,7 +524,7 @@ impl Loop for Moments<'_> {
             let columns = &mut self.columns[run.start as usize..run.end as usize];
             let (columns, rest) = columns.as_chunks_mut::<LANES>();
             let (chunks, tail) = self.region.difference[run.span(width)].as_chunks::<LANES>();
-            // In lanes, so that no sum waits for the one before.
+            // Summed in lanes, so that no addition waits for the previous one.
             let mut lanes = [0.0; LANES];
             for (columns, chunk) in columns.iter_mut().zip(chunks) {
                 for k in 0..LANES {

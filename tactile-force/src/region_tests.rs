@@ -20,7 +20,7 @@ proptest! {
                         expected += values[v * columns + u];
                     }
                 }
-                // Whole numbers below 2²⁴: exact.
+                // Integers below 2²⁴ are exact.
                 prop_assert_eq!(sums[y * columns + x], expected);
             }
         }
@@ -43,7 +43,7 @@ fn mask_of(runs: &[Run], rows: usize) -> Vec<bool> {
     mask
 }
 
-/// Everything of the seed's value that it reaches, by painting until nothing changes.
+/// All pixels with the seed's value that are connected to it, by painting until nothing changes.
 fn reached(mask: &[bool], seed: usize, diagonal: bool) -> Vec<bool> {
     let mut set = vec![false; mask.len()];
     set[seed] = true;

@@ -15,17 +15,17 @@ impl Run {
         (self.end - self.start) as usize
     }
 
-    /// Position of its pixels in a row-major region of the given width.
+    /// Index range of its pixels in a row-major region of the given width.
     pub(crate) fn span(&self, columns: usize) -> Range<usize> {
         let first = self.row as usize * columns;
         first + self.start as usize..first + self.end as usize
     }
 }
 
-/// Pixels that are tested together.
+/// Number of pixels tested together.
 const BLOCK: usize = 32;
 
-/// Appends the runs of a row where `inside` holds.
+/// Appends the runs of a row for which `inside` is true.
 #[inline(always)]
 pub(crate) fn push_runs<P>(
     runs: &mut Vec<Run>,
@@ -35,7 +35,7 @@ pub(crate) fn push_runs<P>(
 ) {
     let mut start = None;
     for (block, pixels) in pixels.chunks(BLOCK).enumerate() {
-        // Most blocks lie wholly inside or outside. Counting takes SIMD instructions, pixels of an
+        // Most blocks are entirely inside or outside. Counting uses SIMD instructions; pixels of an
         // edge are tested one by one.
         let count = pixels.iter().map(|p| u32::from(inside(p))).sum::<u32>() as usize;
         if count == if start.is_some() { pixels.len() } else { 0 } {
@@ -77,7 +77,7 @@ pub(crate) struct Components {
 }
 
 impl Components {
-    /// Joins runs of neighbouring rows that overlap, or touch at a corner if `diagonal`.
+    /// Joins runs of adjacent rows that overlap, or touch at a corner if `diagonal`.
     fn join(&mut self, runs: &[Run], diagonal: bool) {
         self.parent.clear();
         self.parent.extend(0..runs.len() as u32);
@@ -100,7 +100,7 @@ impl Components {
 
     fn root(&mut self, mut k: u32) -> u32 {
         while self.parent[k as usize] != k {
-            // Halving the path keeps later searches short.
+            // Path halving keeps later searches short.
             let up = self.parent[self.parent[k as usize] as usize];
             self.parent[k as usize] = up;
             k = up;
@@ -110,7 +110,7 @@ impl Components {
 
     fn unite(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
-        // The first run of a component stays its root, whatever the order of the joins.
+        // The first run of a component stays its root, independently of the order of the joins.
         self.parent[a.max(b) as usize] = a.min(b);
     }
 
@@ -124,7 +124,7 @@ impl Components {
             let root = self.root(k as u32) as usize;
             self.area[root] += run.len();
         }
-        // The first of equals, so that the answer does not depend on anything but the image.
+        // The first among equals, so that the result depends only on the image.
         let Some((best, &area)) = self.area.iter().enumerate().rev().max_by_key(|(_, a)| **a)
         else {
             return (0, 0);
@@ -148,8 +148,8 @@ impl Components {
         (area, others)
     }
 
-    /// Adds everything the runs enclose: the background that no 4-path joins to the border. Returns
-    /// the area filled.
+    /// Adds all enclosed areas: background that no 4-connected path joins to the border. Returns
+    /// the filled area.
     pub(crate) fn fill_holes(
         &mut self,
         runs: &mut Vec<Run>,
@@ -158,10 +158,10 @@ impl Components {
         columns: usize,
     ) -> usize {
         complement(runs, background, rows, columns);
-        // The object is joined at corners, so that the background must not be: else the two could
+        // The object is 8-connected, so the background must be 4-connected; otherwise the two could
         // cross.
         self.join(background, false);
-        // Components of the background that reach the border are open.
+        // Background components that reach the border are open.
         let (last, columns) = (rows as u32 - 1, columns as u32);
         self.area.clear();
         self.area.resize(background.len(), 0);
@@ -188,10 +188,10 @@ impl Components {
     }
 }
 
-/// In place of an area: background that reaches the border.
+/// Marker instead of an area, for background that reaches the border.
 const OPEN: usize = 1;
 
-/// The runs between the runs.
+/// The gaps between the runs.
 fn complement(runs: &[Run], background: &mut Vec<Run>, rows: usize, columns: usize) {
     background.clear();
     let width = columns as u32;
@@ -229,7 +229,7 @@ fn merge(runs: &mut Vec<Run>) {
     });
 }
 
-/// The runs, sorted by row and start, grown by a square of half width `margin` and clipped to the
+/// The runs, sorted by row and start, dilated by a square of half width `margin` and clipped to the
 /// region.
 pub(crate) fn grow(runs: &[Run], grown: &mut Vec<Run>, margin: usize, rows: usize, columns: usize) {
     grown.clear();

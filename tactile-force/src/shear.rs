@@ -1,9 +1,10 @@
-//! Shear from the step of the centroid: F_x = K_x u_x, F_y = K_y u_y (equations (9)–(12)).
+//! Shear from the displacement of the centroid: F_x = K_x u_x, F_y = K_y u_y (equations (9)–(12)).
 
 use crate::error::ForceError;
 use tactile_core::Estimate;
 
-/// One measurement for the shear calibration: how far the centroid went under a known shear force.
+/// One observation for the shear calibration: the displacement of the centroid under a known shear
+/// force.
 ///
 /// ```
 /// use tactile_force::ShearPair;
@@ -14,7 +15,7 @@ use tactile_core::Estimate;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShearPair {
-    /// Step [x, y] of the centroid, in metres.
+    /// Displacement [x, y] of the centroid, in metres.
     pub centroid_step_m: [f64; 2],
     /// Shear force [x, y], in newtons.
     pub force_n: [f64; 2],
@@ -46,10 +47,11 @@ pub struct ShearCalibration {
 }
 
 impl ShearCalibration {
-    /// Least squares through the origin, each axis on its own: K = Σ u F / Σ u².
+    /// Least-squares fit through the origin, separately for each axis: K = Σ u F / Σ u².
     ///
     /// # Errors
-    /// Fewer than two pairs, a pair that is not finite, or an axis along which nothing moved.
+    /// An error for fewer than two pairs, a pair that is not finite, or an axis without
+    /// displacement.
     pub fn fit(pairs: &[ShearPair]) -> Result<Self, ForceError> {
         if pairs.len() < 2 {
             return Err(ForceError::TooFewPairs {
@@ -73,7 +75,7 @@ impl ShearCalibration {
         })
     }
 
-    /// Shear force [x, y] of a centroid step, in newtons.
+    /// Shear force [x, y] for a displacement of the centroid, in newtons.
     pub fn force_n(&self, centroid_step_m: [Estimate; 2]) -> [Estimate; 2] {
         std::array::from_fn(|k| {
             let (stiffness, step) = (self.stiffness_n_per_m[k], centroid_step_m[k]);
@@ -126,9 +128,9 @@ fn stiffness(pairs: &[ShearPair], axis: usize) -> Result<(Estimate, f64), ForceE
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShearMeasurement {
-    /// Centroid now minus centroid when contact began, [x, y] in metres.
+    /// Current centroid minus centroid at the start of the contact, [x, y] in metres.
     pub displacement_m: [Estimate; 2],
-    /// Centroid now minus centroid of the frame before, [x, y] in metres: u of equations (9) and
+    /// Current centroid minus that of the preceding frame, [x, y] in metres: u of equations (9) and
     /// (10).
     pub step_m: [Estimate; 2],
     /// Shear force since contact began, [x, y] in newtons, equations (11) and (12).
@@ -137,8 +139,9 @@ pub struct ShearMeasurement {
 
 /// Follows the centroid from frame to frame.
 ///
-/// The shear force belongs to the displacement since contact began. Taking each step from the frame
-/// before and adding up would add up the noise of every frame. Here it is that of two.
+/// The shear force is computed from the displacement since the start of the contact. Adding up the
+/// displacements from frame to frame would add up the noise of all frames; here it is that of two
+/// frames.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -190,7 +193,7 @@ pub struct ShearTracker {
 }
 
 impl ShearTracker {
-    /// A tracker that waits for contact.
+    /// Creates a tracker that waits for contact.
     pub fn new(calibration: ShearCalibration) -> Self {
         Self {
             calibration,
@@ -199,9 +202,9 @@ impl ShearTracker {
         }
     }
 
-    /// Takes the centroid [x, y] of the next frame in metres, however it was measured; `None`
+    /// Adds the centroid [x, y] of the next frame in metres, measured by any method, or `None`
     /// without contact. The first frame of a contact has zero shear by definition. After a frame
-    /// without contact the next contact starts anew.
+    /// without contact, the next contact starts anew.
     pub fn update(&mut self, centroid_m: Option<[Estimate; 2]>) -> Option<ShearMeasurement> {
         let Some(now) = centroid_m else {
             (self.first, self.last) = (None, None);
@@ -210,7 +213,7 @@ impl ShearTracker {
         let zero = [Estimate::default(); 2];
         let displacement_m = self.first.map_or(zero, |from| difference(now, from));
         let step_m = self.last.map_or(zero, |from| difference(now, from));
-        // Kept for the whole contact, so that errors of the frames between do not add up.
+        // Kept for the whole contact, so that the errors of intermediate frames do not add up.
         self.first.get_or_insert(now);
         self.last = Some(now);
         Some(ShearMeasurement {

@@ -1,10 +1,10 @@
-//! The one pass over a frame: sums and extremes of its tiles.
+//! The single pass over a frame: sums and extremes of its tiles.
 
 use tactile_core::BoundingBox;
 
-/// Rows of a tile.
+/// Number of rows in a tile.
 pub(crate) const TILE_ROWS: usize = 8;
-/// Columns of a tile.
+/// Number of columns in a tile.
 pub(crate) const TILE_COLUMNS: usize = 32;
 
 /// The sums of all tiles of a frame, and their darkest and brightest pixels.
@@ -23,7 +23,7 @@ impl Tiles {
         self.columns = columns.div_ceil(TILE_COLUMNS);
         self.sums.clear();
         self.sums.resize(self.rows * self.columns, 0);
-        // Written by every pass.
+        // Overwritten by each pass.
         for extremes in [&mut self.darkest, &mut self.brightest] {
             extremes.resize(self.rows * self.columns, 0);
         }
@@ -34,13 +34,13 @@ impl Tiles {
         self.sums.iter().map(|&sum| i64::from(sum)).sum()
     }
 
-    /// Greatest sum of a band, each times `sign`.
+    /// Largest sum in a band, each multiplied by `sign`.
     pub(crate) fn greatest(&self, band: usize, sign: i32) -> i32 {
         let sums = &self.sums[band * self.columns..(band + 1) * self.columns];
         sums.iter().map(|s| sign * s).max().unwrap_or(0)
     }
 
-    /// A tile of a reference, and of a frame that does not differ from it.
+    /// A tile of a reference, for a frame equal to it.
     pub(crate) fn blank(&self, tile: usize, size: (usize, usize)) -> TileSum {
         let at = self.pixels(tile, size);
         TileSum {
@@ -64,7 +64,7 @@ impl Tiles {
     }
 }
 
-/// One tile: its centre, its number of pixels, the reference's sum and the summed difference.
+/// One tile: its centre, number of pixels, sum of the reference and summed difference.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TileSum {
     pub x: f64,
@@ -74,8 +74,8 @@ pub(crate) struct TileSum {
     pub difference: f64,
 }
 
-/// The tiles of an image in standard layout and of nonzero size, and the number of its pixels at
-/// 255. `band` is scratch.
+/// Summarises the tiles of a non-empty row-major image. Returns the number of its pixels with the
+/// value 255. `band` is working memory.
 pub(crate) fn scan(
     image: &[u8],
     size: (usize, usize),
@@ -92,8 +92,8 @@ pub(crate) fn scan(
             darkest: &mut tiles.darkest[here],
             brightest,
         };
-        // As memory has them, pixels that come from far arrive in half the time that they take
-        // where tiles fetch them from eight rows in turn.
+        // In memory order, distant pixels arrive in half the time that tiles need to fetch them
+        // from eight rows in turn.
         band.clear();
         band.extend_from_slice(rows);
         summarise_band(band, size.1, of_band);
@@ -105,7 +105,7 @@ pub(crate) fn scan(
     saturated
 }
 
-/// The tiles of up to eight rows.
+/// Summarises the tiles of up to eight rows.
 pub(crate) fn summarise_band(rows: &[u8], width: usize, mut tiles: OfTiles<'_>) {
     let is_whole = rows.len() == TILE_ROWS * width;
     let whole = if is_whole { width / TILE_COLUMNS } else { 0 };
@@ -113,7 +113,7 @@ pub(crate) fn summarise_band(rows: &[u8], width: usize, mut tiles: OfTiles<'_>) 
         let row = |k: usize| rows[k * width..(k + 1) * width].as_chunks().0;
         summarise(std::array::from_fn(row), tiles.first(whole));
     }
-    // At the image's edges some have fewer rows or columns.
+    // At the edges of the image some tiles have fewer rows or columns.
     for tile in whole..tiles.sums.len() {
         let columns = tile * TILE_COLUMNS..width.min((tile + 1) * TILE_COLUMNS);
         let (mut sum, mut darkest, mut brightest) = (0, u8::MAX, 0);
@@ -135,7 +135,7 @@ pub(crate) type Row = [u8; TILE_COLUMNS];
 /// Eight rows of equal length, in whole tiles.
 pub(crate) type Rows<'a> = [&'a [Row]; TILE_ROWS];
 
-/// What a strip receives: Σ f of every tile, and its darkest and brightest pixel.
+/// Output of a strip: Σ f for each tile, and its darkest and brightest pixel.
 pub(crate) struct OfTiles<'a> {
     sums: &'a mut [i32],
     darkest: &'a mut [u8],
@@ -143,7 +143,7 @@ pub(crate) struct OfTiles<'a> {
 }
 
 impl OfTiles<'_> {
-    /// The first tiles, of this number.
+    /// The first `number` tiles.
     pub(crate) fn first(&mut self, number: usize) -> OfTiles<'_> {
         OfTiles {
             sums: &mut self.sums[..number],
@@ -153,8 +153,8 @@ impl OfTiles<'_> {
     }
 }
 
-/// Summarises the tiles of a strip by the widest instructions that the processor has: integers, so
-/// that no result depends on which.
+/// Summarises the tiles of a strip with the widest available SIMD instructions. They work on
+/// integers, so the result does not depend on the choice.
 pub(crate) fn summarise(rows: Rows<'_>, tiles: OfTiles<'_>) {
     #[cfg(target_arch = "x86_64")]
     if let Some(simd) = pulp::x86::V3::try_new() {
@@ -163,8 +163,8 @@ pub(crate) fn summarise(rows: Rows<'_>, tiles: OfTiles<'_>) {
     each(&Plain, rows, tiles);
 }
 
-/// Tile after tile, so that nothing but its sums leaves the registers: row after row, as memory has
-/// the pixels, takes several times as long.
+/// Tile by tile, so that only the sums leave the registers. Row by row, in memory order, it would
+/// take several times as long.
 #[inline(always)]
 pub(crate) fn each(instructions: &impl Summarise, rows: Rows<'_>, tiles: OfTiles<'_>) {
     let number = tiles.sums.len();
@@ -177,13 +177,13 @@ pub(crate) fn each(instructions: &impl Summarise, rows: Rows<'_>, tiles: OfTiles
     }
 }
 
-/// Instructions that summarise a tile.
+/// SIMD instructions that summarise a tile.
 pub(crate) trait Summarise {
-    /// Sum, darkest and brightest pixel of a tile of eight rows.
+    /// Sum, darkest and brightest pixel of a tile with eight rows.
     fn summary(&self, rows: &Rows<'_>, tile: usize) -> (i32, [u8; 2]);
 }
 
-/// Plain loops, which the compiler turns into the instructions that every processor has.
+/// Plain loops, which the compiler vectorises with the baseline instructions.
 pub(crate) struct Plain;
 
 impl Summarise for Plain {
@@ -193,13 +193,14 @@ impl Summarise for Plain {
         let mut columns = [0_u16; TILE_COLUMNS];
         for row in rows {
             let f = &row[tile];
-            // A loop for every width of numbers: mixed, the bytes fill half a register.
+            // A separate loop for each integer width: if they were mixed, the bytes would fill only
+            // half a register.
             for j in 0..TILE_COLUMNS {
                 low[j] = low[j].min(f[j]);
                 high[j] = high[j].max(f[j]);
             }
             for j in 0..TILE_COLUMNS {
-                // Eight times 255 fits. Checked, the sum would be taken pixel by pixel.
+                // Eight times 255 fits. Checked addition would not be vectorised.
                 columns[j] = columns[j].wrapping_add(u16::from(f[j]));
             }
         }
@@ -213,8 +214,8 @@ impl Summarise for Plain {
     }
 }
 
-/// AVX2, whose sum of absolute differences adds eight bytes at once, which no plain loop becomes: a
-/// quarter of the plain loops' time.
+/// AVX2. Its sum of absolute differences adds eight bytes at once, which the compiler does not
+/// generate from plain loops: it takes a quarter of their time.
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
     use std::arch::x86_64::{__m128i, __m256i};
@@ -257,7 +258,7 @@ mod avx2 {
         }
     }
 
-    /// The least of 32 bytes.
+    /// The minimum of 32 bytes.
     #[inline(always)]
     fn least(simd: V3, bytes: __m256i) -> u8 {
         let (sse2, sse4) = (simd.sse2, simd.sse4_1);

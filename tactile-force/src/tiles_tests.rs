@@ -2,14 +2,14 @@ use super::*;
 use proptest::prelude::*;
 
 proptest! {
-    /// By plain loops and by whatever instructions this machine has: those of the pixels one by
-    /// one.
+    /// Plain loops and the SIMD instructions of this machine give the same results as single
+    /// pixels.
     #[test]
     fn a_tile_is_its_pixels(
         pixels in proptest::collection::vec(any::<u8>(), TILE_ROWS * TILE_COLUMNS),
         low in 0_u8..255, span in 0_u8..=255
     ) {
-        // Anywhere within any range of grey levels.
+        // Grey levels in an arbitrary range.
         let grey = |p: u8| (u32::from(low) + u32::from(p) * u32::from(span) / 255).min(255) as u8;
         let row = |k: usize| std::array::from_fn(|j| grey(pixels[TILE_COLUMNS * k + j]));
         let tile: [Row; TILE_ROWS] = std::array::from_fn(row);

@@ -1,12 +1,12 @@
 //! The local light-to-pressure curve f of (5), fitted from frames: P = f(I), F_z = ∫ f(I) dS.
 //!
-//! The force is linear in the coefficients of the curve, with the grey histogram of the contact as
-//! the row of the design,
+//! The force is linear in the coefficients of the curve, and the grey histogram of the contact is
+//! the row of the design matrix:
 //!
-//! F_i = Σ_g A_i(g) f(g), A_i(g) the area in m² whose difference from the reference is g grey
-//! levels in frame i.
+//! F_i = Σ_g A_i(g) f(g), with A_i(g) the area in m² of frame i whose difference from the reference
+//! is g grey levels.
 //!
-//! f rises, passes through the origin and is as smooth as cross-validation finds best.
+//! f is monotone, passes through the origin, and has the smoothness that cross-validation selects.
 
 use nalgebra::{SMatrix, SVector};
 #[cfg(feature = "serde")]
@@ -38,10 +38,11 @@ pub struct CalibrationFrame {
 }
 
 impl CalibrationFrame {
-    /// A frame whose contact has this histogram while a gauge shows this force, rising or falling.
+    /// Creates a frame from the histogram of its contact and the gauge's force, taken while the
+    /// force was rising or falling.
     ///
     /// # Errors
-    /// A force that is negative or not finite.
+    /// An error for a force that is negative or not finite.
     pub fn new(histogram: GreyHistogram, force_n: f64, branch: Branch) -> Result<Self, ForceError> {
         Requirement::NonNegative.check("force_n", force_n)?;
         Ok(Self {
@@ -52,12 +53,12 @@ impl CalibrationFrame {
     }
 }
 
-/// The weights of the frames.
+/// Options for the weights of the frames.
 ///
 /// ```
 /// use tactile_force::PressureCurveOptions;
 ///
-/// // A gauge good to 0.5 % of the force and 0.1 % of its range.
+/// // A gauge with an error of 0.5 % of the force and 0.1 % of its range.
 /// let options = PressureCurveOptions::default().with_force_error(0.005, 0.001)?;
 /// assert!(options.with_force_error(0.005, f64::NAN).is_err());
 /// # Ok::<(), tactile_force::ForceError>(())
@@ -79,13 +80,13 @@ impl Default for PressureCurveOptions {
 }
 
 impl PressureCurveOptions {
-    /// Weights the frames as if their errors were this share of the force and this share of the
-    /// largest force, added in quadrature. Only the ratio matters: the size is estimated from the
+    /// Weights the frames by these errors: a fraction of the force and a fraction of the largest
+    /// force, added in quadrature. Only their ratio matters, because the size is estimated from the
     /// residuals.
     ///
     /// # Errors
-    /// A share that is negative or not finite, or no error of the range, which frames without force
-    /// need.
+    /// An error for a fraction that is negative or not finite, and for a zero error of the range,
+    /// which frames without force need.
     pub fn with_force_error(mut self, of_force: f64, of_range: f64) -> Result<Self, ForceError> {
         self.relative_error = Requirement::NonNegative.check("of_force", of_force)?;
         self.range_error = Requirement::Positive.check("of_range", of_range)?;
@@ -99,14 +100,14 @@ impl PressureCurveOptions {
 /// use tactile_force::{CurveHysteresis, Estimate};
 ///
 /// let lag = CurveHysteresis::new(Estimate::new(0.02, 0.003));
-/// // Half of the difference beyond its error: the relative error of a force of unknown branch.
+/// // Half of the difference beyond its error is the relative error of a force of unknown branch.
 /// assert!((lag.width - 0.5 * (0.02_f64.powi(2) - 0.003_f64.powi(2)).sqrt()).abs() < 1e-15);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct CurveHysteresis {
-    /// (f_loading − f_unloading)/f, each branch scaled to its own frames.
+    /// (f_loading − f_unloading)/f, with each branch scaled to its own frames.
     pub relative: Estimate,
     /// Half of the difference beyond its own error, √(relative² − error²)/2 or zero: the relative
     /// error of a force whose branch is unknown. Every reading includes it.
@@ -114,7 +115,7 @@ pub struct CurveHysteresis {
 }
 
 impl CurveHysteresis {
-    /// From the relative difference.
+    /// Creates the hysteresis from the relative difference.
     #[must_use]
     pub fn new(relative: Estimate) -> Self {
         let excess = relative.value.powi(2) - relative.standard_error.powi(2);
@@ -125,7 +126,7 @@ impl CurveHysteresis {
     }
 }
 
-/// How well a curve fits its frames, and which grey levels these determine.
+/// Quality of the fit, and the grey levels that the frames determine.
 ///
 /// See [`PressureCurve`] for an example.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -134,42 +135,41 @@ impl CurveHysteresis {
 pub struct PressureCurveReport {
     /// Number of frames.
     pub frames: usize,
-    /// Trace of the smoother: the number of parameters that the data determined.
+    /// Trace of the smoother: the effective number of parameters.
     pub effective_parameters: f64,
-    /// Standard deviation of the residuals relative to the frames' assumed errors of
-    /// [`PressureCurveOptions`]: 1 if these are right.
+    /// Standard deviation of the residuals relative to the errors assumed in
+    /// [`PressureCurveOptions`]. It is 1 if these are correct.
     pub residual_sd: f64,
-    /// Residual of every frame, known force minus fitted, in newtons.
+    /// Residual of each frame, known force minus fitted, in newtons.
     pub residuals_n: Vec<f64>,
-    /// The smoothness used.
+    /// Smoothness used for the fit.
     pub smoothness: f64,
-    /// Root mean square error of forces that were left out of the fit, relative to the assumed
-    /// errors.
+    /// Root mean square leave-out error of the forces, relative to the assumed errors.
     pub cross_validation_error: f64,
-    /// Least and greatest grey level between which f is known to 5 %. Zero to zero if nowhere.
+    /// Range of grey levels in which f is known to 5 %. Zero to zero if there is none.
     pub identified_grey: [f64; 2],
-    /// Loading against unloading. `None` unless each has three frames.
+    /// Difference between loading and unloading. `None` unless each has three frames.
     pub hysteresis: Option<CurveHysteresis>,
 }
 
 /// The local light-to-pressure curve f of (5): pressure in pascals of a pixel's grey-level
 /// difference.
 ///
-/// Fitted from frames of contacts under known forces by penalised least squares: f rises, f(0) = 0,
-/// smoothness by cross-validation. Standard errors come from the Bayesian covariance σ²(XᵀX + λP)⁻¹
-/// of the coefficients, which includes the bias of smoothing (G. Wahba, J. R. Statist. Soc. B 45
-/// (1983) 133–150). O(frames × grey levels).
+/// It is fitted to frames of contacts under known forces by penalised least squares: f is monotone,
+/// f(0) = 0, and the smoothness follows from cross-validation. Standard errors come from the
+/// Bayesian covariance σ²(XᵀX + λP)⁻¹ of the coefficients, which includes the bias of smoothing (G.
+/// Wahba, J. R. Statist. Soc. B 45 (1983) 133–150). O(frames × grey levels).
 ///
-/// As a [`StressCalibration`] it carries a line through the origin of the same frames' sums, for
-/// integrated pixel values without a frame. A [`ForceMeter`](crate::ForceMeter) uses the curve
-/// itself: force, centroid and profile are then those of the pressure.
+/// As a [`StressCalibration`] it contains a line through the origin, fitted to the sums of the same
+/// frames, for integrated pixel values without a frame. A [`ForceMeter`](crate::ForceMeter) uses
+/// the curve itself: force, centroid and profile are then those of the pressure.
 ///
 /// ```
 /// use tactile_force::{
 ///     Branch, CalibrationFrame, DifferenceNoise, GreyHistogram, LocalCalibration, PressureCurve,
 /// };
 ///
-/// // Discs of even grey whose light goes as the pressure's square root.
+/// // Discs of uniform grey whose light is the square root of the pressure.
 /// let disc = |k: i32| {
 ///     let differences = std::iter::repeat_n(12.0 * k as f32, 1000);
 ///     let histogram = GreyHistogram::from_differences(differences, 1e-9);
@@ -198,14 +198,14 @@ pub struct PressureCurveReport {
 pub struct PressureCurve {
     #[cfg_attr(feature = "serde", serde(deserialize_with = "checked"))]
     coefficients: Coefficients,
-    /// How well the curve fits its frames, and which grey levels these determine.
+    /// Quality of the fit, and the grey levels that the frames determine.
     pub report: PressureCurveReport,
-    /// F(V) of the same frames.
+    /// F(V) for the same frames.
     sums: LinearCalibration,
 }
 
-/// Coefficients from a file. Refuses what no fit gives: a curve that falls, or numbers that are not
-/// finite.
+/// Reads coefficients from a file. Rejects values that no fit can give: a decreasing curve, or
+/// non-finite numbers.
 #[cfg(feature = "serde")]
 fn checked<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Coefficients, D::Error> {
     let c: Coefficients = serde::Deserialize::deserialize(from)?;
@@ -230,8 +230,8 @@ fn checked<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Coefficients, D:
 impl PressureCurve {
     /// Fits the curve to frames under known forces, loading and unloading.
     ///
-    /// # Errors
-    /// Fewer than five frames, no force or no light in any of them, or light that falls with the
+    /// An error for fewer than five frames, for frames without any force or light, and for light
+    /// that decreases with the force.
     /// force.
     pub fn fit(
         frames: &[CalibrationFrame],
@@ -267,7 +267,7 @@ impl PressureCurve {
             branch: f.branch,
         };
         let pairs: Vec<_> = frames.iter().map(pair).collect();
-        // The curve passes through the origin, and so does the line of the same frames.
+        // The curve passes through the origin, and so does the line for the same frames.
         let through_origin = CalibrationOptions::default().with_zero_at_origin();
         Ok(Self {
             coefficients,
@@ -308,8 +308,8 @@ impl LocalCalibration for PressureCurve {
         let hysteresis = self.report.hysteresis.map_or(0.0, |h| h.width * force);
         let error = c.variance(&row).max(0.0).sqrt().hypot(hysteresis);
         Ok(ForceReading {
-            // A hundredth of the force from grey levels beyond those identified is within the
-            // stated error. More is a guess.
+            // Up to a hundredth of the force may come from grey levels outside the identified
+            // range, within the stated error. More would be a guess.
             out_of_range: beyond > 0.01 * force.abs(),
             ..ForceReading::new(force, noise_n, error, Some(c.degrees_of_freedom))
         })
@@ -346,20 +346,20 @@ impl StressCalibration for PressureCurve {
     }
 }
 
-/// Number of knots. Twelve intervals follow powers from 0.8 to 1.2 to 10⁻³ of the force. More cost
-/// nothing but are all prior.
+/// Number of knots. Twelve intervals represent powers from 0.8 to 1.2 within 10⁻³ of the force.
+/// Further knots would be determined by the prior alone.
 const KNOTS: usize = 13;
 
-/// One number a knot: slopes, or the integrals they are multiplied with.
+/// One value per knot: slopes, or the integrals by which they are multiplied.
 type Knots = SVector<f64, KNOTS>;
 type Normal = SMatrix<f64, KNOTS, KNOTS>;
 
-/// f(d) = ∫₀ᵈ s with s linear between its values at the knots. Slopes that are not negative make f
-/// rise.
+/// f(d) = ∫₀ᵈ s, with s linear between its values at the knots. Non-negative slopes make f
+/// monotone.
 ///
-/// Knots lie at t_j = top (j/12)²: light that goes as a power of the pressure bends most near zero.
-/// Below zero f goes on with the slope at zero, so that noise about zero adds nothing. Beyond the
-/// top it goes on with the last slope.
+/// Knots are at t_j = top (j/12)², because light that is a power of the pressure bends most near
+/// zero. Below zero f continues with the slope at zero, so that noise about zero has no net effect.
+/// Above the top it continues with the last slope.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Basis {
@@ -372,7 +372,7 @@ impl Basis {
         self.top * share * share
     }
 
-    /// The interval that holds `d`, and its share from the interval's start.
+    /// The interval that contains `d`, and the relative position of `d` in it.
     fn place(&self, d: f64) -> (usize, f64) {
         let intervals = (KNOTS - 1) as f64;
         let at = (intervals * (d / self.top).max(0.0).sqrt()).min(intervals - 1.0) as usize;
@@ -380,7 +380,7 @@ impl Basis {
         (at, ((d - from) / (to - from)).clamp(0.0, 1.0))
     }
 
-    /// The integral over each knot's slope: f(d) is the scalar product with the slopes.
+    /// The integral belonging to each knot's slope: f(d) is the scalar product with the slopes.
     fn integrals(&self, d: f64) -> Knots {
         let mut row = Knots::zeros();
         if d <= 0.0 {
@@ -398,7 +398,8 @@ impl Basis {
         row
     }
 
-    /// The slope at `d` is the scalar product with the slopes at the knots.
+    /// The interpolation weights of the knots: the slope at `d` is the scalar product with the
+    /// slopes.
     fn weights(&self, d: f64) -> Knots {
         let (at, x) = self.place(d);
         let mut row = Knots::zeros();
@@ -418,7 +419,7 @@ impl Basis {
 struct Coefficients {
     basis: Basis,
     slopes: [f64; KNOTS],
-    /// Symmetric, column by column.
+    /// Symmetric matrix, by columns.
     covariance: [[f64; KNOTS]; KNOTS],
     degrees_of_freedom: f64,
 }
@@ -434,25 +435,26 @@ impl Coefficients {
         Knots::from(self.slopes)
     }
 
-    /// Variance of a sum of slopes with these factors.
+    /// Variance of a linear combination of the slopes.
     fn variance(&self, row: &Knots) -> f64 {
         row.dot(&(Normal::from(self.covariance) * row))
     }
 }
 
-/// Rows and forces, each divided by the frame's assumed error. Slopes in units of their mean.
+/// Rows and forces, each divided by the assumed error of the frame. Slopes are in units of their
+/// mean.
 struct Problem {
     basis: Basis,
     rows: Vec<Knots>,
     forces: Vec<f64>,
     errors: Vec<f64>,
-    /// Pascals per grey level that fit all frames best.
+    /// Pascals per grey level of the best straight line.
     unit: f64,
 }
 
 struct Solution {
     slopes: Knots,
-    /// Inverse of the penalised normal matrix, zero for slopes held at zero.
+    /// Inverse of the penalised normal matrix, with zeros for slopes held at zero.
     inverse: Normal,
     /// Trace of the smoother.
     effective: f64,
@@ -463,7 +465,7 @@ impl Problem {
         frames: &[CalibrationFrame],
         options: &PressureCurveOptions,
     ) -> Result<Self, ForceError> {
-        // Five forces leave degrees of freedom beside a curve of three.
+        // Five forces leave degrees of freedom even for a curve with three parameters.
         if frames.len() < 5 {
             return Err(ForceError::TooFewPairs {
                 required: 5,
@@ -491,7 +493,7 @@ impl Problem {
             vv += integral * integral;
             vf += integral * frame.force_n / error;
         }
-        // Slopes in units of the best straight line are numbers near one.
+        // Slopes in units of the best straight line are close to one.
         let unit = vf / vv;
         if !(unit > 0.0 && unit.is_finite()) {
             return Err(ForceError::NotMonotone { from: 0.0, to: top });
@@ -525,7 +527,7 @@ impl Problem {
         self.forces[frame] - self.rows[frame].dot(slopes)
     }
 
-    /// Penalised least squares over the frames that are kept.
+    /// Penalised least squares over the frames selected by `keep`.
     fn solve(&self, smoothness: f64, keep: impl Fn(usize) -> bool) -> Solution {
         let (mut data, mut right) = (Normal::zeros(), Knots::zeros());
         for i in (0..self.rows.len()).filter(|i| keep(*i)) {
@@ -533,15 +535,14 @@ impl Problem {
             right += self.rows[i] * self.forces[i];
         }
         let weight = smoothness * data.trace() / KNOTS as f64;
-        // A trace of first differences keeps the matrix definite where the frames leave a straight
-        // slope undetermined.
-        // Second differences of the slopes: a curve whose slope is straight in the knots costs
-        // nothing.
+        // A small penalty on first differences keeps the matrix definite if the frames leave a
+        // straight slope undetermined. The main penalty is on second differences: a curve whose
+        // slope is linear in the knots has no penalty.
         let normal = data
             + differences([1.0, -2.0, 1.0]) * weight
             + differences([-1.0, 1.0]) * (1e-6 * weight);
         let (slopes, free) = nonnegative(&normal, &right);
-        // Slopes held at zero are known, and have no variance.
+        // Slopes held at zero are known and have no variance.
         let mut inverse = bound(&normal, &free)
             .cholesky()
             .map_or(Normal::zeros(), |c| c.inverse());
@@ -555,10 +556,10 @@ impl Problem {
         }
     }
 
-    /// The smoothness with the least error on frames left out, and that error.
+    /// The smoothness with the smallest cross-validation error, and that error.
     fn cross_validated(&self) -> (f64, f64) {
         let count = self.rows.len();
-        // Parts that are left out in turn: each frame alone where there are few.
+        // Groups left out in turn. With few frames, each group is one frame.
         let folds = count.min(10);
         let error = |smoothness: f64| {
             let mut squares = 0.0;
@@ -570,12 +571,12 @@ impl Problem {
             }
             (squares / count as f64).sqrt()
         };
-        // From a curve that follows every frame to one whose slope is a parabola in the grey
-        // level's root.
+        // From a curve that follows every frame to one whose slope is a parabola in the root of the
+        // grey level.
         let mut best = (0.0, f64::INFINITY);
         for smoothness in [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0, 1000.0] {
             let here = error(smoothness);
-            // Of equal errors the smoother curve.
+            // Among equal errors, the smoother curve.
             if here <= best.1 {
                 best = (smoothness, here);
             }
@@ -583,7 +584,7 @@ impl Problem {
         best
     }
 
-    /// Each branch's own scale of the common curve, by least squares.
+    /// Scale of each branch relative to the common curve, by least squares.
     fn hysteresis(&self, frames: &[CalibrationFrame], slopes: &Knots) -> Option<CurveHysteresis> {
         let scale = |branch: Branch| {
             let of_branch = (0..frames.len()).filter(|i| frames[*i].branch == branch);
@@ -612,7 +613,7 @@ impl Problem {
     }
 }
 
-/// Σ of the products of rows of differences, each with these factors from one knot on.
+/// Sum over knots of the outer products of difference rows with these coefficients.
 fn differences<const N: usize>(factors: [f64; N]) -> Normal {
     let mut penalty = Normal::zeros();
     for j in 0..=KNOTS - N {
@@ -623,7 +624,7 @@ fn differences<const N: usize>(factors: [f64; N]) -> Normal {
     penalty
 }
 
-/// The longest run of whole grey levels on which f is known well enough.
+/// The longest run of integer grey levels in which f is known well enough.
 fn identified(coefficients: &Coefficients) -> [f64; 2] {
     let known = |grey: f64| {
         let e = coefficients.pressure_pa(grey);
@@ -641,13 +642,13 @@ fn identified(coefficients: &Coefficients) -> [f64; 2] {
 }
 
 /// The minimiser of ½ xᵀHx − gᵀx over x ≥ 0, and which coefficients are free (C. Lawson and R.
-/// Hanson, *Solving Least Squares Problems*, 1974, chapter 23). H is positive definite.
+/// Hanson, *Solving Least Squares Problems*, 1974, chapter 23). H must be positive definite.
 fn nonnegative(normal: &Normal, right: &Knots) -> (Knots, [bool; KNOTS]) {
     let mut free = [false; KNOTS];
     let mut x = Knots::zeros();
-    // Rounding of a gradient.
+    // Rounding error of a gradient.
     let tolerance = 1e-12 * right.amax();
-    // Each round frees one coefficient. In practice few are bound again.
+    // Each round frees one coefficient. In practice, few are bound again.
     for _ in 0..10 * KNOTS {
         let gradient = right - normal * x;
         let most = (0..KNOTS)
@@ -660,7 +661,7 @@ fn nonnegative(normal: &Normal, right: &Knots) -> (Knots, [bool; KNOTS]) {
         loop {
             let target = unconstrained(normal, right, &free);
             let leaving = (0..KNOTS).filter(|&j| free[j] && target[j] <= 0.0);
-            // The largest step towards the target that keeps every coefficient.
+            // The largest step towards the target that keeps every coefficient non-negative.
             let step = leaving
                 .map(|j| x[j] / (x[j] - target[j]))
                 .fold(f64::INFINITY, f64::min);
@@ -680,7 +681,7 @@ fn nonnegative(normal: &Normal, right: &Knots) -> (Knots, [bool; KNOTS]) {
     (x, free)
 }
 
-/// The minimiser over the free coefficients, zero elsewhere.
+/// The minimiser over the free coefficients, with zeros elsewhere.
 fn unconstrained(normal: &Normal, right: &Knots, free: &[bool; KNOTS]) -> Knots {
     let (normal, right) = (
         bound(normal, free),

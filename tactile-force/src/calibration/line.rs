@@ -1,4 +1,4 @@
-//! The straight line F = b + s V, its report, and the least squares behind it.
+//! The straight line F = b + s V, its report, and the underlying least-squares fit.
 
 use nalgebra::{Matrix2, Vector2};
 use tactile_core::Estimate;
@@ -16,7 +16,7 @@ use crate::error::ForceError;
 /// assert!((line.force_n(2.5e5) - 1.25).abs() < 1e-12);
 /// assert!((line.sensitivity_n(1e5) - 5e-6).abs() < 1e-17);
 /// assert_eq!(line.range(), [0.0, 4e5]);
-/// // A line of frame sums holds for contacts of one shape: it has no local curve.
+/// // A line of frame sums is valid for contacts of one shape: it has no local curve.
 /// assert!(line.local().is_none());
 /// // Offset and slope with their standard errors.
 /// let [offset, slope] = line.report().parameters[..] else { unreachable!() };
@@ -26,7 +26,7 @@ use crate::error::ForceError;
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LinearCalibration {
-    /// Pixel value about which the line is held: there level and slope are (nearly) uncorrelated.
+    /// Reference pixel value of the line, at which level and slope are (nearly) uncorrelated.
     centre: f64,
     level_n: Estimate,
     slope_n: Estimate,
@@ -39,8 +39,8 @@ impl LinearCalibration {
     /// Fits the line to pairs of integrated pixel value and force.
     ///
     /// # Errors
-    /// Fewer pairs than parameters + 1, a pair that is not finite, or pairs at one pixel value
-    /// only.
+    /// An error for fewer than one pair more than parameters, for a pair that is not finite, and
+    /// for pairs at a single pixel value.
     pub fn fit(
         pairs: &[CalibrationPair],
         options: &CalibrationOptions,
@@ -49,7 +49,7 @@ impl LinearCalibration {
         check_pairs(pairs, columns)?;
         let values: Vec<f64> = pairs.iter().map(|p| p.integrated_pixel_value).collect();
         let forces: Vec<f64> = pairs.iter().map(|p| p.force_n).collect();
-        // Centre and half width of the pixel values keep the two parameters apart.
+        // Centring and scaling of the pixel values decorrelate the two parameters.
         let centre = if options.through_origin {
             0.0
         } else {
@@ -57,7 +57,7 @@ impl LinearCalibration {
         };
         let greatest = |from: f64| values.iter().map(|v| (v - from).abs()).fold(0.0, f64::max);
         let scale = greatest(centre);
-        // Values that differ by rounding alone do not determine a slope.
+        // Values that differ only by rounding do not determine a slope.
         if scale <= 4.0 * f64::EPSILON * greatest(0.0) || scale == 0.0 {
             return Err(ForceError::DegeneratePairs { span: scale });
         }
@@ -96,7 +96,7 @@ impl LinearCalibration {
         })
     }
 
-    /// How well the line fits its pairs.
+    /// Quality of the fit.
     #[must_use]
     pub fn report(&self) -> &LineReport {
         &self.report
@@ -139,7 +139,8 @@ impl StressCalibration for LinearCalibration {
     fn error_covariance_n2(&self, a: f64, b: f64) -> f64 {
         let (level, slope) = (self.level_n.standard_error, self.slope_n.standard_error);
         let (a, b) = (a - self.centre, b - self.centre);
-        // A force whose branch is not known lies half their difference from the line.
+        // A force of unknown branch deviates from the line by half of the difference between the
+        // branches.
         let branch = self.report.hysteresis.map_or(0.0, |h| h.width_n);
         level * level + slope * a * (slope * b) + self.covariance * (a + b) + branch * branch
     }
@@ -149,7 +150,7 @@ impl StressCalibration for LinearCalibration {
     }
 }
 
-/// Refuses pairs that no fit can use: too few for the parameters, or not finite.
+/// Rejects pairs that cannot be fitted: too few for the parameters, or not finite.
 fn check_pairs(pairs: &[CalibrationPair], parameters: usize) -> Result<(), ForceError> {
     let finite =
         |p: &CalibrationPair| p.integrated_pixel_value.is_finite() && p.force_n.is_finite();
@@ -179,7 +180,7 @@ fn check_pairs(pairs: &[CalibrationPair], parameters: usize) -> Result<(), Force
 /// let hysteresis = line.report().hysteresis.expect("both branches");
 /// assert!((hysteresis.mean_n.value - 0.01).abs() < 1e-12);
 /// assert!((hysteresis.share_of_full_scale - 0.01 / 1.01).abs() < 1e-9);
-/// // The line lies between the branches: a force of unknown branch is off by half of that.
+/// // The line lies between the branches, so a force of unknown branch is off by half of that.
 /// assert!((hysteresis.width_n - 0.005).abs() < 1e-12);
 /// assert!((line.standard_error_n(5.0) - 0.005).abs() < 3e-4);
 /// # Ok::<(), tactile_force::ForceError>(())
@@ -188,16 +189,16 @@ fn check_pairs(pairs: &[CalibrationPair], parameters: usize) -> Result<(), Force
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Hysteresis {
-    /// Greatest difference of the two branches at one pixel value, loading minus unloading, in
+    /// Largest difference of the two branches at one pixel value, loading minus unloading, in
     /// newtons.
     pub greatest_n: f64,
     /// Mean difference over the range of both branches, in newtons.
     pub mean_n: Estimate,
-    /// Half of the mean difference where it exceeds three times its own error, else zero, in
-    /// newtons. Every force whose branch is not known has this standard error, common to all of
+    /// Half of the mean difference if it exceeds three times its own error, otherwise zero, in
+    /// newtons. Every force of unknown branch has this standard error, which is common to all of
     /// them.
     pub width_n: f64,
-    /// |greatest| as a share of the full scale.
+    /// |greatest| as a fraction of the full scale.
     pub share_of_full_scale: f64,
 }
 
@@ -218,7 +219,7 @@ pub struct Hysteresis {
 ///     interval.contains(5e-6)
 ///         && interval.upper.unwrap() > 5e-6 + 2.0 * report.parameters[1].standard_error
 /// );
-/// // The report of a curve of one's own, with one parameter.
+/// // The report of a user-defined curve with one parameter.
 /// let own = LineReport::new(&pairs, |v| 4.98e-6 * v, 1);
 /// assert!(own.residual_sd_n < 0.02 && own.degrees_of_freedom == 3);
 /// # Ok::<(), tactile_force::ForceError>(())
@@ -229,34 +230,35 @@ pub struct Hysteresis {
 pub struct LineReport {
     /// Number of pairs.
     pub pairs: usize,
-    /// Parameters with their standard errors and degrees of freedom: [offset, slope] of a line,
-    /// slope alone through the origin.
+    /// Parameters with their standard errors and degrees of freedom: [offset, slope] for a line,
+    /// the slope alone for a line through the origin.
     pub parameters: Vec<Estimate>,
-    /// Pairs less parameters.
+    /// Number of pairs minus number of parameters.
     pub degrees_of_freedom: usize,
     /// Coefficient of determination, 1 − Σr²/Σ(F − F̄)².
     pub r_squared: f64,
     /// Standard deviation of the residuals, √(Σr²/(n − p)), in newtons.
     pub residual_sd_n: f64,
-    /// Residual of every pair, measured minus fitted, in newtons.
+    /// Residual of each pair, measured minus fitted, in newtons.
     pub residuals_n: Vec<f64>,
-    /// Loading against unloading. `None` unless both branches were given and overlap.
+    /// Difference between loading and unloading. `None` unless both branches were given and
+    /// overlap.
     pub hysteresis: Option<Hysteresis>,
-    /// Greatest distance of a pair from the curve, as a share of the full scale.
+    /// Largest distance of a pair from the curve, as a fraction of the full scale.
     pub linearity_error: f64,
     /// Mean sensitivity over the range, (F(V₁) − F(V₀))/(V₁ − V₀), in newtons per grey level.
     pub sensitivity_n: f64,
     /// Smallest force resolved: three residual standard deviations, in newtons.
     pub smallest_force_n: f64,
-    /// Greatest force minus least force of the pairs, in newtons.
+    /// Largest force minus smallest force of the pairs, in newtons.
     pub full_scale_n: f64,
-    /// The curve rises between the pairs' pixel values.
+    /// Whether the curve increases between the pixel values of the pairs.
     pub monotone: bool,
 }
 
 impl LineReport {
-    /// The report of a curve F(V) with this number of fitted parameters, by its residuals from the
-    /// pairs. The parameters themselves are not known to it. O(pairs · log pairs).
+    /// The report of a curve F(V) with this number of fitted parameters, from its residuals. The
+    /// parameters themselves are left empty. O(pairs · log pairs).
     #[must_use]
     pub fn new(pairs: &[CalibrationPair], curve: impl Fn(f64) -> f64, parameters: usize) -> Self {
         let forces: Vec<f64> = pairs.iter().map(|p| p.force_n).collect();
@@ -303,9 +305,9 @@ fn extremes(values: &[f64]) -> [f64; 2] {
 }
 
 impl Hysteresis {
-    /// Compares the residuals of each branch with the other branch's, interpolated at the same
-    /// pixel value. Residuals are nearly flat where forces are steep, so that interpolation adds
-    /// next to nothing.
+    /// Compares the residuals of each branch with those of the other branch, interpolated at the
+    /// same pixel value. Residuals are nearly constant where forces are steep, so interpolation
+    /// adds almost no error.
     fn of(pairs: &[CalibrationPair], residuals: &[f64], full_scale_n: f64) -> Option<Self> {
         let branch = |wanted: Branch| {
             let both = pairs.iter().zip(residuals);
@@ -324,7 +326,7 @@ impl Hysteresis {
             .iter()
             .filter_map(|&(v, r)| interpolate(&up, v).map(|other| other - r));
         let differences: Vec<f64> = at_loading.chain(at_unloading).collect();
-        // The greatest by size keeps its sign.
+        // The largest by absolute value, with its sign.
         let by_size = |a: &&f64, b: &&f64| a.abs().total_cmp(&b.abs());
         let greatest_n = *differences.iter().max_by(by_size)?;
         let n = differences.len() as f64;
@@ -333,8 +335,8 @@ impl Hysteresis {
         let degrees = (n - 1.0).max(1.0);
         let mean_n =
             Estimate::from_variance(mean, squares / degrees / n).with_degrees_of_freedom(degrees);
-        // Noise alone must not widen the errors of calibrations without hysteresis: three standard
-        // errors let one in 400 through.
+        // Noise alone must not widen the errors of calibrations without hysteresis: at three
+        // standard errors, one in 400 is affected.
         let is_clear = mean.abs() > 3.0 * mean_n.standard_error;
         Some(Self {
             greatest_n,
@@ -356,23 +358,23 @@ fn interpolate(points: &[(f64, f64)], v: f64) -> Option<f64> {
     Some(r0 + (r1 - r0) * (v - v0) / (v1 - v0))
 }
 
-/// Least squares of a level and a slope over x, or of a slope alone.
+/// Least-squares fit of a level and a slope over x, or of a slope alone.
 struct Fit {
     coefficients: Vector2<f64>,
-    /// (XᵀWX)⁻¹. Of a level that is not fitted the identity's.
+    /// (XᵀWX)⁻¹. If the level is not fitted, its entries are those of the identity.
     inverse: Matrix2<f64>,
     /// Standard deviation of the error of a pair of weight 1.
     residual_sd: f64,
 }
 
 impl Fit {
-    /// The fit with weights 1/(1 + k F²/F_max²): pairs whose noise has a constant part and one that
-    /// grows with the force, as that of a gauge of so many per cent of the reading.
+    /// The fit with weights 1/(1 + k F²/F_max²), for noise with a constant part and a part
+    /// proportional to the force, as for a gauge specified in per cent of the reading.
     ///
-    /// Of k = 0, 4 (the degrees of freedom, where there are fewer) and 30 the one of the greatest
-    /// restricted likelihood is taken. Few pairs do not decide. There the middle one is preferred
-    /// by 0.8 in the likelihood's logarithm. Of its 95 % intervals 92 to 98 % then hold in the
-    /// middle of the range, whichever noise there is.
+    /// Among k = 0, 4 (or the degrees of freedom, if there are fewer) and 30, the one with the
+    /// largest restricted likelihood is used. Few pairs do not decide between them, so the middle
+    /// one is preferred by 0.8 in the log-likelihood. The coverage of its 95 % intervals is then 92
+    /// to 98 % in the middle of the range, for each kind of noise.
     fn weighted(x: &[f64], forces: &[f64], options: &CalibrationOptions) -> Option<Self> {
         let largest = forces.iter().fold(0.0, |m: f64, f| m.max(f.abs()));
         let columns = if options.through_origin { 1 } else { 2 };
@@ -386,11 +388,11 @@ impl Fit {
             let weight = |f: &f64| 1.0 / (1.0 + growth * (f / largest).powi(2));
             let weights: Vec<f64> = forces.iter().map(weight).collect();
             let fit = Self::solve(x, forces, &weights, options.through_origin)?;
-            // Pairs without noise leave rounding, which has no likelihood.
+            // Pairs without noise leave only rounding, which has no likelihood.
             if fit.residual_sd <= 1e-12 * largest {
                 return Some(even);
             }
-            // The logarithm of the restricted likelihood, but for constants (Patterson and Thompson
+            // Logarithm of the restricted likelihood, apart from constants (Patterson and Thompson
             // 1971).
             let of_weights = 0.5 * weights.iter().map(|w| w.ln()).sum::<f64>();
             let of_fit = 0.5 * fit.inverse.determinant().ln() - freedom * fit.residual_sd.ln();
@@ -402,7 +404,7 @@ impl Fit {
         best.1.or(Some(even))
     }
 
-    /// `None` where x is not finite: it is of order one, and then determines both.
+    /// `None` if x is not finite. Otherwise x is of order one and determines both parameters.
     fn solve(x: &[f64], y: &[f64], weights: &[f64], through_origin: bool) -> Option<Self> {
         let level = if through_origin { 0.0 } else { 1.0 };
         let pairs = || {

@@ -1,15 +1,16 @@
 //! From pixel values to force and stress: P = f(I), F_z = ∫P dS, equations (5) and (6).
 //!
 //! A line ([`LinearCalibration`]) is fitted to pairs of integrated pixel value V = Σ (I − I_ref)
-//! over the contact and known force F, taken while loading and unloading. It gives F(V), its
-//! standard error and, shared out over the pixels in proportion to their grey level, the stress
+//! over the contact and known force F, taken while loading and unloading. It gives F(V) with its
+//! standard error. Distributed over the pixels in proportion to their grey level, it also gives the
+//! stress
 //!
 //! ```text
 //! P_ij = (I_ij − I_ref,ij) F(V) / (V A),   A = area of a pixel,   so that  Σ P_ij A = F(V).
 //! ```
 //!
-//! It holds for contacts shaped like those it was made with. A local curve ([`PressureCurve`]) of
-//! grey level to pressure holds for any contact.
+//! The line is valid for contacts shaped like those of the calibration. A local curve
+//! ([`PressureCurve`]) from grey level to pressure is valid for any contact.
 
 mod curve;
 mod line;
@@ -26,7 +27,7 @@ use tactile_core::{Estimate, Source, Uncertain};
 use crate::error::ForceError;
 use crate::noise::DifferenceNoise;
 
-/// A force read from a calibration.
+/// A force read with a calibration.
 ///
 /// ```
 /// use tactile_force::{
@@ -39,7 +40,7 @@ use crate::noise::DifferenceNoise;
 /// let reading = line.read(Estimate::new(2.5e5, 400.0))?;
 /// let part = |source| reading.force_n.part(source).abs();
 /// assert!(part(Source::Noise) < part(Source::Calibration) && !reading.out_of_range);
-/// // Four pairs less two parameters, and a little more for the noise that is known.
+/// // Four pairs minus two parameters, slightly increased because the noise is known.
 /// assert!((2.0..3.0).contains(&reading.force_n.total().degrees_of_freedom.unwrap()));
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
@@ -48,15 +49,15 @@ use crate::noise::DifferenceNoise;
 #[non_exhaustive]
 pub struct ForceReading {
     /// Force in newtons with the errors of the frame's noise and of the calibration. The latter was
-    /// estimated from a few pairs and is common to all frames that are read with it.
+    /// estimated from a few pairs and is common to all frames that use the calibration.
     pub force_n: Uncertain,
-    /// The pixel value lies outside the range of the calibration.
+    /// Whether the pixel value is outside the range of the calibration.
     pub out_of_range: bool,
 }
 
 impl ForceReading {
-    /// A force with the standard errors of the frame's noise and of the calibration, the latter
-    /// estimated with these degrees of freedom.
+    /// Creates a force with the standard errors of the frame's noise and of the calibration. The
+    /// latter has these degrees of freedom.
     ///
     /// ```
     /// use tactile_force::ForceReading;
@@ -79,16 +80,16 @@ impl ForceReading {
     }
 }
 
-/// Pixel value to force and stress, equations (5) and (6).
+/// From pixel value to force and stress, equations (5) and (6).
 ///
 /// V is the integrated pixel value: the sum of the grey-level differences over the contact. A
-/// calibration of one's own has to give F(V). The other methods have defaults, which suit a curve
-/// whose own error is negligible.
+/// user-defined calibration must give F(V). The other methods have defaults that suit a curve of
+/// negligible error.
 ///
 /// ```
 /// use tactile_force::{Estimate, Source, StressCalibration};
 ///
-/// /// Light that grows as the square of the force.
+/// /// Light that grows with the square of the force.
 /// struct Root;
 ///
 /// impl StressCalibration for Root {
@@ -102,7 +103,7 @@ impl ForceReading {
 /// assert_eq!((force_n.value, force_n.part(Source::Calibration)), (1.0, 0.0));
 /// // dF/dV = ½ F/V.
 /// assert!((force_n.part(Source::Noise) - 1e-3).abs() < 1e-9);
-/// // Stress of one grey level on pixels of (20 µm)².
+/// // Stress per grey level on pixels of (20 µm)².
 /// assert!((Root.stress_per_grey_level_pa(1e6, 4e-10) - 2500.0).abs() < 1e-9);
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
@@ -110,37 +111,37 @@ pub trait StressCalibration: Send + Sync {
     /// Force at an integrated pixel value, in newtons.
     fn force_n(&self, integrated_pixel_value: f64) -> f64;
 
-    /// dF/dV, in newtons per grey level. By default a central difference.
+    /// dF/dV, in newtons per grey level. The default is a central difference.
     fn sensitivity_n(&self, integrated_pixel_value: f64) -> f64 {
         let v = integrated_pixel_value;
-        // The cube root of the rounding error balances it against the third derivative.
+        // The cube root of the rounding error balances rounding against the third derivative.
         let step = 1e-5 * v.abs().max(1.0);
         (self.force_n(v + step) - self.force_n(v - step)) / (2.0 * step)
     }
 
     /// Standard error of the force due to the calibration itself, in newtons: the uncertainty of
-    /// its parameters, and the difference of its branches ([`Hysteresis::width_n`]). Zero by
-    /// default.
+    /// its parameters, and the difference of its branches ([`Hysteresis::width_n`]). The default is
+    /// zero.
     fn standard_error_n(&self, _integrated_pixel_value: f64) -> f64 {
         0.0
     }
 
-    /// Degrees of freedom of that standard error, pairs less parameters. By default the error is
-    /// known, and there are none.
+    /// Degrees of freedom of this standard error: number of pairs minus number of parameters. The
+    /// default is `None`, for a known error.
     fn degrees_of_freedom(&self) -> Option<f64> {
         None
     }
 
-    /// Covariance of the calibration's errors at two integrated pixel values, in N². By default
+    /// Covariance of the calibration's errors at two integrated pixel values, in N². By default the
     /// errors at all pixel values are fully correlated.
     fn error_covariance_n2(&self, a: f64, b: f64) -> f64 {
         self.standard_error_n(a) * self.standard_error_n(b)
     }
 
-    /// Covariance matrix of forces read with this one calibration, in N²: C_ij = cov_cal(V_i, V_j)
-    /// + δ_ij (dF/dV)² σ_V².
+    /// Covariance matrix of forces read with this calibration, in N²: C_ij = cov_cal(V_i, V_j) +
+    /// δ_ij (dF/dV)² σ_V².
     ///
-    /// The noise of the frames is each force's own, the calibration's error is shared. O(n²).
+    /// The noise of the frames is independent; the error of the calibration is common. O(n²).
     ///
     /// ```
     /// use tactile_force::{CalibrationPair, Estimate, LinearCalibration, StressCalibration};
@@ -165,13 +166,13 @@ pub trait StressCalibration: Send + Sync {
         })
     }
 
-    /// The least and the greatest integrated pixel value that the calibration holds for. By default
-    /// all.
+    /// Range of integrated pixel values for which the calibration is valid. The default is
+    /// unlimited.
     fn range(&self) -> [f64; 2] {
         [f64::NEG_INFINITY, f64::INFINITY]
     }
 
-    /// The curve that holds pixel by pixel. By default there is none.
+    /// The curve that is valid pixel by pixel. The default is `None`.
     fn local(&self) -> Option<&dyn LocalCalibration> {
         None
     }
@@ -179,7 +180,7 @@ pub trait StressCalibration: Send + Sync {
     /// Force with its standard error √((dF/dV)² σ_V² + σ_cal²).
     ///
     /// # Errors
-    /// None by default. A calibration of one's own may refuse with [`ForceError::custom`].
+    /// None by default. A user-defined calibration may return [`ForceError::custom`].
     fn read(&self, integrated_pixel_value: Estimate) -> Result<ForceReading, ForceError> {
         let v = integrated_pixel_value.value;
         let [low, high] = self.range();
@@ -191,8 +192,8 @@ pub trait StressCalibration: Send + Sync {
         })
     }
 
-    /// Stress per grey level of difference, in pascals, in a contact of the given integrated pixel
-    /// value: F(V)/(V A). Where V is zero, its limit along the curve, (dF/dV)/A.
+    /// Stress per grey level of difference, in pascals, in a contact with the given integrated
+    /// pixel value: F(V)/(V A). If V is zero, it is the limit along the curve, (dF/dV)/A.
     fn stress_per_grey_level_pa(&self, integrated_pixel_value: f64, pixel_area_m2: f64) -> f64 {
         let v = integrated_pixel_value;
         let secant = if v == 0.0 {
@@ -204,7 +205,7 @@ pub trait StressCalibration: Send + Sync {
     }
 }
 
-/// Boxed, shared and borrowed calibrations.
+/// Implements the trait for boxed, shared and borrowed calibrations.
 impl<P: Deref<Target: StressCalibration> + Send + Sync> StressCalibration for P {
     fn force_n(&self, integrated_pixel_value: f64) -> f64 {
         (**self).force_n(integrated_pixel_value)
@@ -247,11 +248,12 @@ impl<P: Deref<Target: StressCalibration> + Send + Sync> StressCalibration for P 
     }
 }
 
-/// Grey level to pressure pixel by pixel: f of (5) itself, not only its integral over a contact.
+/// From grey level to pressure, pixel by pixel: f of (5) itself, rather than its integral over a
+/// contact.
 ///
 /// A [`StressCalibration`] returns one from [`local`](StressCalibration::local). A
-/// [`ForceMeter`](crate::ForceMeter) then fits the contact's radius to the pressure instead of the
-/// light. A curve of one's own has to give the pressure of a grey level.
+/// [`ForceMeter`](crate::ForceMeter) then fits the contact radius to the pressure instead of the
+/// light. A user-defined curve must give the pressure of a grey level.
 ///
 /// ```
 /// use tactile_force::{DifferenceNoise, Estimate, GreyHistogram, LocalCalibration};
@@ -276,11 +278,11 @@ impl<P: Deref<Target: StressCalibration> + Send + Sync> StressCalibration for P 
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 pub trait LocalCalibration: Send + Sync {
-    /// Pressure in pascals of a grey-level difference, with its standard error. Rises with the grey
-    /// level and is zero at zero.
+    /// Pressure in pascals of a grey-level difference, with its standard error. It increases with
+    /// the grey level and is zero at zero.
     fn pressure_pa(&self, grey: f64) -> Estimate;
 
-    /// The value of [`pressure_pa`](Self::pressure_pa) alone, for tables.
+    /// The value of [`pressure_pa`](Self::pressure_pa) without its error, for tables.
     fn value_pa(&self, grey: f64) -> f64 {
         self.pressure_pa(grey).value
     }
@@ -289,7 +291,7 @@ pub trait LocalCalibration: Send + Sync {
     /// grey levels are fully correlated.
     ///
     /// # Errors
-    /// None by default. A curve of one's own may refuse with [`ForceError::custom`].
+    /// None by default. A user-defined curve may return [`ForceError::custom`].
     fn read(
         &self,
         histogram: &GreyHistogram,
@@ -304,7 +306,7 @@ pub trait LocalCalibration: Send + Sync {
     }
 }
 
-/// Boxed, shared and borrowed calibrations.
+/// Implements the trait for boxed, shared and borrowed calibrations.
 impl<P: Deref<Target: LocalCalibration> + Send + Sync> LocalCalibration for P {
     fn pressure_pa(&self, grey: f64) -> Estimate {
         (**self).pressure_pa(grey)
@@ -323,10 +325,11 @@ impl<P: Deref<Target: LocalCalibration> + Send + Sync> LocalCalibration for P {
     }
 }
 
-/// The area of a contact by its grey-level difference from the reference, one bin a grey level.
+/// The area of a contact by grey-level difference from the reference, with one bin per grey level.
 ///
-/// A difference between two whole grey levels is shared out between them, so that area and integral
-/// of the differences are exact. The integral of a curve f over the contact is Σ A(g) f(g).
+/// A difference between two integer grey levels is distributed between both bins, so that area and
+/// integral of the differences are exact. The integral of a curve f over the contact is Σ A(g)
+/// f(g).
 ///
 /// ```
 /// use ndarray::array;
@@ -340,7 +343,7 @@ impl<P: Deref<Target: LocalCalibration> + Send + Sync> LocalCalibration for P {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GreyHistogram {
-    /// From −256 grey levels to 256.
+    /// Bins from −256 to 256 grey levels.
     area_m2: Vec<f64>,
     pixel_area_m2: f64,
 }
@@ -356,7 +359,7 @@ impl Default for GreyHistogram {
 
 impl GreyHistogram {
     /// Sorts the differences of a contact's pixels, in grey levels, each covering `pixel_area_m2`.
-    /// Differences beyond ±255 count as ±255, NaN is left out.
+    /// Differences beyond ±255 count as ±255, and NaN is skipped.
     pub fn from_differences(differences: impl Iterator<Item = f32>, pixel_area_m2: f64) -> Self {
         let mut histogram = Self::default();
         histogram.clear(pixel_area_m2);
@@ -376,18 +379,18 @@ impl GreyHistogram {
         self.bins().map(|(grey, area)| area * f(grey)).sum()
     }
 
-    /// Empties the bins for a contact whose pixels cover this area each.
+    /// Empties the bins for a contact whose pixels each cover this area.
     pub(crate) fn clear(&mut self, pixel_area_m2: f64) {
         self.area_m2.fill(0.0);
         self.pixel_area_m2 = pixel_area_m2;
     }
 
-    /// Adds a number of pixels of one difference.
+    /// Adds a number of pixels with the same difference.
     pub(crate) fn add_many(&mut self, difference: f32, pixels: f64) {
         let place = f64::from(difference.clamp(-255.0, 255.0)) + 256.0;
         let below = place as usize;
         let (share, area) = (place - below as f64, pixels * self.pixel_area_m2);
-        // Shared out in proportion, the first moment of the bins is that of the difference.
+        // Distributed in proportion, the first moment of the bins is that of the difference.
         self.area_m2[below] += (1.0 - share) * area;
         self.area_m2[below + 1] += share * area;
     }
@@ -399,13 +402,13 @@ impl GreyHistogram {
             .map(|(bin, area)| (bin as f64 - 256.0, *area))
     }
 
-    /// The greatest grey level of the contact.
+    /// The largest grey level of the contact.
     fn greatest(&self) -> f64 {
         self.bins().map(|(grey, _)| grey).fold(0.0, f64::max)
     }
 
-    /// Standard error of ∫ f dS by the noise of the pixels, for a curve f of this slope: white
-    /// noise of each pixel, and the errors that all pixels share.
+    /// Standard error of ∫ f dS because of the noise of the pixels, for a curve f with this slope:
+    /// white noise of each pixel, and errors common to all pixels.
     fn noise(&self, noise: &DifferenceNoise, slope: impl Fn(f64) -> f64) -> f64 {
         let (mut white, mut common, mut scale) = (0.0, 0.0, 0.0);
         for (grey, area) in self.bins() {
@@ -414,7 +417,7 @@ impl GreyHistogram {
             common += area * slope;
             scale += area * slope * grey;
         }
-        // Both come from one estimate of the drift and add before squaring.
+        // Both come from one estimate of the drift, so they are added before squaring.
         let shared = common * noise.common.sqrt() + scale * noise.scale.sqrt();
         (white * self.pixel_area_m2 + shared * shared + noise.flat_field * scale * scale).sqrt()
     }
@@ -480,7 +483,7 @@ impl CalibrationPair {
     }
 }
 
-/// The options of a calibration fit.
+/// Options of a calibration fit.
 ///
 /// ```
 /// use tactile_force::{

@@ -1,4 +1,4 @@
-//! The area within a contact's outline, from the light of the pixels that the outline cuts.
+//! The area inside a contact's outline, from the light of the pixels that the outline cuts.
 
 use nalgebra::{Vector4, Vector5};
 use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut1, Axis, Zip};
@@ -6,59 +6,62 @@ use tactile_core::{BoundingBox, Estimate, Polarity};
 
 use super::FaceReading;
 
-/// Pixels either side of the outline whose light is summed. Blur of 0.8 pixels carries 1 % further,
-/// which is missing as much inside, where pixels are counted as whole, as it is outside.
+/// Pixels on either side of the outline whose light is summed. Blur of 0.8 pixels moves 1 %
+/// further. This light is missing equally inside, where pixels are counted as whole, and outside.
 const BAND: u8 = 2;
 /// Pixels from there inwards over which the light is averaged: more is quieter, fewer follow a
-/// texture more closely.
+/// Width in pixels of the ring further inside in which the light is averaged: a wider ring has less
+/// noise, a narrower one follows texture more closely.
 const RING: u8 = 4;
-/// Depth of the ring's middle, where pixels beside the outline have the depth 1.
+/// Depth of the middle of the ring. Pixels next to the outline have the depth 1.
 const RING_MIDDLE: f64 = BAND as f64 + 0.5 * (RING as f64 + 1.0);
-/// Greatest distance from the outline that is computed.
+/// Largest distance from the outline that is computed.
 const FARTHEST: u8 = 12;
-/// Pixels around the contact's box that are looked at: the band, and the background beyond it.
+/// Margin in pixels around the box of the contact: the band, and the background outside it.
 const MARGIN: usize = 10;
-/// Side of the tiles in which the ring's light is averaged. A mean is over three by three of them.
+/// Side of the tiles in which the light of the ring is averaged. A mean covers three by three
+/// tiles.
 const TILE: usize = 8;
-/// Fewest pixels of a mean: fewer are as noisy as the pixels themselves.
+/// Minimum number of pixels for a mean: with fewer it is as noisy as the pixels themselves.
 const FEWEST: f64 = 8.0;
 
 /// Sums of the ring's light in one tile.
 #[derive(Clone, Copy, Debug, Default)]
 struct Tile {
-    /// Σ of one, the light, the depth t below the ring's middle, t², and t times the light.
+    /// Σ of one, the light, the depth t below the middle of the ring, t², and t times the light.
     ring: Vector5<f64>,
-    /// Change of the light with the depth, where it is more than noise.
+    /// Change of the light with depth. Zero if it is not significant.
     slope: f64,
-    /// Mean light at the ring's middle in this tile and those around it, and the pixels in it.
+    /// Mean light at the middle of the ring in this and the neighbouring tiles, and the number of
+    /// pixels.
     mean: f64,
     pixels: f64,
-    /// Σ s/P of the outline's pixels here: the weight of the mean's error.
+    /// Σ s/P of the outline's pixels here: the weight of the error of the mean.
     covered: f64,
 }
 
-/// A pixel's terms of moments: one, x, y and x² + y².
+/// Terms of a pixel in the moments: one, x, y and x² + y².
 fn moments(x: f64, y: f64) -> Vector4<f64> {
     Vector4::new(1.0, x, y, x * x + y * y)
 }
 
-/// Measures flat faces, with buffers that are kept from frame to frame.
+/// Measures flat faces, with buffers reused from frame to frame.
 ///
 /// See [`FaceReading`] for an example.
 #[derive(Debug, Default)]
 pub struct FaceWorkspace {
-    /// Frame minus reference around the contact, positive where it touches.
+    /// Frame minus reference around the contact, positive in the contact.
     signal: Array2<f32>,
     inside: Array2<bool>,
     distance: Array2<u8>,
-    /// The pixels nearer to the outline than `FARTHEST`.
+    /// The pixels closer to the outline than `FARTHEST`.
     near: Vec<[usize; 2]>,
     tiles: Array2<Tile>,
 }
 
 impl FaceWorkspace {
-    /// The face in a contact, from a frame and its reference, the contact's box and its pixels
-    /// within the box. `None` where the contact is too small or too irregular to have an inside.
+    /// The face of a contact, from a frame and its reference, the box of the contact and its pixels
+    /// in the box. `None` if the contact is too small or too irregular to have an interior.
     ///
     /// O(pixels of the box).
     pub fn measure(
@@ -76,8 +79,7 @@ impl FaceWorkspace {
         Zip::from(&mut self.signal)
             .and(window.of(frame))
             .and(window.of(reference))
-            // Differences keep their sign: outside the face noise of both signs has to cancel in
-            // the sum.
+            // Differences keep their sign, so that noise outside the face cancels in the sum.
             .for_each(|s, &f, &r| *s = sign * (f32::from(f) - f32::from(r)));
         let part = BoundingBox {
             row_start: region.row_start - window.row_start,
@@ -100,8 +102,8 @@ impl FaceWorkspace {
         self.sum(pixel_size_m, variance)
     }
 
-    /// Which pixels are inside: brighter than half the lower quartile of the contact's light, which
-    /// is half the light of a plain face.
+    /// Finds the inside pixels: brighter than half the lower quartile of the contact's light, which
+    /// for a plain face is half of its light.
     fn threshold(&mut self, part: BoundingBox, mask: ArrayView2<'_, bool>) -> Option<()> {
         let signal = part.of(self.signal.view());
         let mut counts = [0_usize; 511];
@@ -114,8 +116,8 @@ impl FaceWorkspace {
             below += pixels;
             below > quarter
         })?;
-        // The lower quartile, not the mean: bright spots of a texture would raise the level above
-        // its dark ones.
+        // The lower quartile is used instead of the mean, because bright spots of a texture would
+        // raise the level above its dark spots.
         let level = 0.5 * (quartile as f32 - 255.0);
         if level <= 0.0 {
             return None;
@@ -132,7 +134,7 @@ impl FaceWorkspace {
         Some(())
     }
 
-    /// Mean light a few pixels outside the outline, which the reference does not have.
+    /// Mean light a few pixels outside the outline, in excess of the reference.
     fn background(&self) -> f64 {
         let beyond = BAND + 2..=MARGIN as u8 - 1;
         let (mut sum, mut count) = (0.0, 0.0);
@@ -145,8 +147,8 @@ impl FaceWorkspace {
         if count > 0.0 { sum / count } else { 0.0 }
     }
 
-    /// Variance of a pixel's noise some way inside, from second differences along rows, which have
-    /// six times that variance. They leave out what is linear, a texture too.
+    /// Variance of a pixel's noise some distance inside, from second differences along rows, whose
+    /// variance is six times as large. Linear changes, also those of a texture, cancel.
     fn noise_variance(&self) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0_f64);
         for &at in &self.near {
@@ -163,7 +165,7 @@ impl FaceWorkspace {
         sum / (6.0 * count.max(1.0))
     }
 
-    /// The light just inside the outline, around every tile.
+    /// Averages the light just inside the outline, around each tile.
     fn average_ring(&mut self, variance: f64) -> Option<()> {
         let (rows, columns) = self.signal.dim();
         resize(
@@ -196,8 +198,8 @@ impl FaceWorkspace {
             // Least squares of the light over the depth, about the means of both.
             let spread = tt - t * t / count;
             let slope = (t_light - t * light / count) / spread;
-            // Below three standard errors extrapolating the noise would make the area of plain
-            // faces ten times as noisy.
+            // Below three standard errors, extrapolated noise would make the area of plain faces
+            // ten times as noisy.
             let is_clear = spread > 0.0 && slope * slope * spread > 9.0 * variance;
             tile.slope = if is_clear { slope } else { 0.0 };
             tile.mean = (light - tile.slope * t) / count;
@@ -206,11 +208,11 @@ impl FaceWorkspace {
         Some(())
     }
 
-    /// Area, moments and errors.
+    /// Computes area, moments and errors.
     fn sum(&mut self, [hx, hy]: [f64; 2], variance: f64) -> Option<FaceReading> {
         let [mut area, mut light] = self.deep_moments([hx, hy]);
-        // Light 4 to 5 and 8 to 9 pixels inside with the number of pixels, and the outline's
-        // length.
+        // Light 4 to 5 and 8 to 9 pixels inside with the number of pixels, and the length of the
+        // outline.
         let (mut near, mut far, mut outline) = ([0.0; 2], [0.0; 2], 0.0);
         let mut of_pixels = 0.0;
         for &at in &self.near {
@@ -218,7 +220,7 @@ impl FaceWorkspace {
             let (inside, distance) = (self.inside[at], self.distance[at]);
             let signal = f64::from(self.signal[at]);
             let (x, y) = (column as f64 * hx, row as f64 * hy);
-            // Further out there is nothing of the face, and further in every pixel counts whole.
+            // Pixels further out do not belong to the face; pixels further in count as whole.
             if distance > BAND {
                 if inside {
                     area += moments(x, y);
@@ -233,7 +235,7 @@ impl FaceWorkspace {
             }
             let tile = &mut self.tiles[[row / TILE, column / TILE]];
             // Outside pixels have the light of the outline itself, half a pixel before the first
-            // one inside.
+            // inside pixel.
             let depth = if inside { f64::from(distance) } else { 0.5 };
             let level = tile.mean + tile.slope * (depth - RING_MIDDLE);
             if level <= 0.0 {
@@ -250,11 +252,11 @@ impl FaceWorkspace {
         if far[1] < FEWEST || area[0] <= 0.0 || light[0] <= 0.0 {
             return None;
         }
-        // Of the outline's mean place sampling, rounding to grey levels and the slope of a texture
-        // leave 5e-4 pixels.
+        // Sampling, rounding to grey levels and the slope of a texture contribute 5e-4 pixels to
+        // the mean position of the outline.
         let noise = variance * (of_pixels + self.weights_squared());
         let error = noise.sqrt().hypot(5e-4 * outline);
-        // Σ w r² about the area's centre, over Σ w.
+        // Σ w r² about the centre of the area, over Σ w.
         let (x, y) = (area[1] / area[0], area[2] / area[0]);
         let [of_area, of_light] =
             [area, light].map(|m| (m[3] - 2.0 * (x * m[1] + y * m[2])) / m[0] + x * x + y * y);
@@ -267,8 +269,8 @@ impl FaceWorkspace {
         })
     }
 
-    /// Moments of the area and of the light over the pixels beyond `FARTHEST` from the outline,
-    /// which are nearly all: row by row, since a column's place is common to them.
+    /// Moments of the area and of the light over the pixels deeper than `FARTHEST`, which are
+    /// nearly all. They are summed by rows, because the column positions are common to them.
     fn deep_moments(&self, [hx, hy]: [f64; 2]) -> [Vector4<f64>; 2] {
         let [mut area, mut light] = [Vector4::zeros(); 2];
         let rows = self.signal.rows().into_iter();
@@ -288,7 +290,8 @@ impl FaceWorkspace {
                 }
             }
             let y = row as f64 * hy;
-            // From sums of the weights, and of the weights times the column and its square.
+            // Moments from the sums of the weights, and of the weights times the column and its
+            // square.
             let of_row = |[one, column, square]: [f64; 3]| {
                 let squares = square * hx * hx + one * y * y;
                 Vector4::new(one, column * hx, one * y, squares)
@@ -299,14 +302,15 @@ impl FaceWorkspace {
         [area, light]
     }
 
-    /// Σ w² over the ring's pixels, w the change of the area by a grey level of one of them.
+    /// Σ w² over the pixels of the ring, where w is the change of the area per grey level of one of
+    /// them.
     fn weights_squared(&self) -> f64 {
         let mut sum = 0.0;
         for ((row, column), tile) in self.tiles.indexed_iter() {
             if tile.ring[0] > 0.0 {
                 let near = around(&self.tiles, row, column);
-                // A grey level of the ring changes the mean light of nine tiles, and thereby the
-                // shares there.
+                // A grey level in the ring changes the mean light of nine tiles, and thereby the
+                // covered fractions there.
                 let weight: f64 = near.map(|t| t.covered / (t.pixels * t.mean)).sum();
                 sum += tile.ring[0] * weight * weight;
             }
@@ -315,7 +319,7 @@ impl FaceWorkspace {
     }
 }
 
-/// Gives a buffer another shape, in its memory where that is enough.
+/// Changes the shape of a buffer, reusing its memory if possible.
 fn resize<T: Clone + Default>(array: &mut Array2<T>, shape: (usize, usize)) {
     if array.dim() != shape {
         let (mut memory, _) = std::mem::take(array).into_raw_vec_and_offset();
@@ -324,7 +328,7 @@ fn resize<T: Clone + Default>(array: &mut Array2<T>, shape: (usize, usize)) {
     }
 }
 
-/// A row's pixels, side by side as they lie in the buffers.
+/// The pixels of a row, contiguous in the buffers.
 fn pixels_of<T>(row: ArrayView1<'_, T>) -> &[T] {
     row.to_slice().unwrap_or_default()
 }
@@ -337,8 +341,8 @@ fn around(tiles: &Array2<Tile>, row: usize, column: usize) -> impl Iterator<Item
     rows.flat_map(move |row| columns.clone().map(move |column| &tiles[[row, column]]))
 }
 
-/// For every pixel the chessboard distance to the nearest pixel on the other side of the outline,
-/// at most `FARTHEST`: 1 beside the outline. Beyond the image its last pixels go on. O(pixels).
+/// The chessboard distance of each pixel to the nearest pixel on the other side of the outline, at
+/// most `FARTHEST`, and 1 next to the outline. The image is extended by its last pixels. O(pixels).
 fn distance_to_outline(inside: &Array2<bool>, distance: &mut Array2<u8>) {
     let [from_outside, from_inside] = [false, true].map(|side| distance_to_side(inside, side));
     // One of the two is zero.
@@ -348,12 +352,11 @@ fn distance_to_outline(inside: &Array2<bool>, distance: &mut Array2<u8>) {
         .for_each(|distance, outside, inside| *distance = outside + inside);
 }
 
-/// The chessboard distance to the nearest pixel on a side, at most `FARTHEST`. With g the distance
-/// within the column, it is the least of max(|k|, g(x + k)) over the columns x + k near by.
+/// The chessboard distance to the nearest pixel on one side, at most `FARTHEST`. With g the
+/// distance within the column, it is the minimum of max(|k|, g(x + k)) over nearby columns x + k.
 fn distance_to_side(inside: &Array2<bool>, side: bool) -> Array2<u8> {
     let (rows, columns) = inside.dim();
-    // Two passes along the columns, down and up, leave g. The rows then combine the columns near
-    // by.
+    // Two passes along the columns, down and up, give g. The rows then combine nearby columns.
     let mut distance = inside.mapv(|pixel| if pixel == side { 0 } else { FARTHEST });
     for row in 1..rows {
         let (above, mut below) = distance.view_mut().split_at(Axis(0), row);
@@ -378,7 +381,7 @@ fn distance_to_side(inside: &Array2<bool>, side: bool) -> Array2<u8> {
     distance
 }
 
-/// Lowers the distances of a row to one more than those of a row beside it.
+/// Limits the distances of a row to one more than those of an adjacent row.
 fn come_closer(row: ArrayViewMut1<'_, u8>, beside: ArrayView1<'_, u8>) {
     Zip::from(row)
         .and(beside)

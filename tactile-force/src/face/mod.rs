@@ -1,27 +1,28 @@
-//! Flat faces: the area of a contact from its own region, and how a flat face differs from a ball.
+//! Flat faces: the area of a contact from its own region, and the differences between a flat face
+//! and a ball.
 //!
 //! # Area
-//! A pixel that the outline cuts shows the covered share, times the light beside it. With s the
-//! frame minus the reference, and P the light of the face just inside the outline, the area is
+//! A pixel cut by the outline has the light beside it times its covered fraction. With s the frame
+//! minus the reference, and P the light of the face just inside the outline, the area is
 //!
 //! A = h_x h_y Σ s/P over the pixels around the outline + the pixels further inside.
 //!
-//! Blur moves light across the outline, but takes none away. The sum does not change as long as the
-//! outline bends on a scale much larger than the blur. P is the mean over a ring of pixels near by,
-//! so that it follows texture, vignetting and uneven pressure. Where the outer and the inner half
-//! of that ring differ by more than noise explains, P is extrapolated from both. The error of A is
-//! that of noise in both rings of pixels, and a floor for the shape of texture and sampling.
+//! Blur moves light across the outline, but removes none. The sum is unchanged if the outline bends
+//! on a scale much larger than the blur. P is the mean over a ring of nearby pixels, so it follows
+//! texture, vignetting and uneven pressure. If the outer and the inner half of the ring differ by
+//! more than the noise, P is extrapolated from both. The error of A comes from noise in both rings
+//! of pixels, plus a minimum for texture and sampling.
 //!
 //! # Shape
 //! Just inside its outline a flat face is as bright as further inside. Under a ball the pressure
-//! √(1 − r²/a²) falls to zero there as the square root of the distance. The ratio of the light 3 to
-//! 5 pixels inside to that 7 to 9 pixels inside is 1 for the one and some 0.7 for the other,
-//! whatever their size ([`FaceReading::edge_ratio`]).
+//! √(1 − r²/a²) falls to zero there with the square root of the distance. The ratio of the light 3
+//! to 5 pixels inside to that 7 to 9 pixels inside is 1 for a flat face and about 0.7 for a ball of
+//! any size ([`FaceReading::edge_ratio`]).
 //!
-//! Two numbers show whether the deformation between two loads is the same everywhere. The second
-//! moment of the outline over the square of its area does not change as long as the outline keeps
-//! its shape. The second moment of the light over that of the area does not change as long as the
-//! pressure follows the material. Friction, slip and tilt change them.
+//! Two numbers reveal whether the deformation between two loads is uniform. The second moment of
+//! the outline, divided by the square of its area, is constant if the outline keeps its shape. The
+//! ratio of the second moments of light and area is constant if the pressure follows the material.
+//! Friction, slip and tilt change both.
 //!
 //! # Stretch
 //! The lateral stretch between two loads is √(A₂/A₁), from the outline.
@@ -37,7 +38,7 @@ use tactile_core::Estimate;
 /// use ndarray::Array2;
 /// use tactile_force::{BoundingBox, FaceReading, FaceWorkspace, Polarity};
 ///
-/// // An even square of 60 × 60 pixels, its outline between pixels.
+/// // A uniform square of 60 × 60 pixels, with its outline between pixels.
 /// let reference = Array2::from_elem((120, 120), 20_u8);
 /// let mut frame = reference.clone();
 /// frame.slice_mut(ndarray::s![30..90, 30..90]).fill(120);
@@ -58,19 +59,19 @@ use tactile_core::Estimate;
 pub struct FaceReading {
     /// Area within the outline in square metres.
     pub area_m2: Estimate,
-    /// Light 3 to 5 pixels inside the outline over that 7 to 9 pixels inside: 1 for an even
-    /// pressure, some 0.7 for a ball's.
+    /// Light 3 to 5 pixels inside the outline relative to that 7 to 9 pixels inside: 1 for a
+    /// uniform pressure, about 0.7 for a ball's.
     pub edge_ratio: f64,
     /// 2π (m_xx + m_yy)/A² of the outline, m the second moments about its centre: 1 for a disc, π/3
     /// for a square.
     pub outline_moment: f64,
-    /// Second moment of the light about the outline's centre over that of the area, both by their
-    /// sums: 1 for an even pressure, below where it is higher in the middle.
+    /// Second moment of the light about the centre of the outline relative to that of the area,
+    /// each normalised: 1 for a uniform pressure, less if it is higher in the middle.
     pub light_moment: f64,
 }
 
 impl FaceReading {
-    /// An evenly pressed face of this area and shape.
+    /// A uniformly pressed face of this area and shape.
     ///
     /// ```
     /// use tactile_force::{Estimate, FaceReading};
@@ -87,22 +88,23 @@ impl FaceReading {
         }
     }
 
-    /// Whether the outline is an edge, as that of a flat face, and no ball's: an edge ratio of at
-    /// least 0.85. Texture lowers the 1 of an even pressure to 0.9, balls have 0.65 to 0.75.
+    /// Whether the outline is an edge, as for a flat face, rather than a ball's: an edge ratio of
+    /// at least 0.85. A uniform pressure has 1, reduced by texture to 0.9 at least; balls have 0.65
+    /// to 0.75.
     #[must_use]
     pub fn has_edge(&self) -> bool {
         self.edge_ratio >= 0.85
     }
 
-    /// Whether the pressure rises to the outline, as under a stiff punch on a soft layer, or where
+    /// Whether the pressure rises towards the outline, as under a stiff punch on a soft layer or if
     /// the face sticks to the sensor: an edge ratio above 1.18.
     #[must_use]
     pub fn sticks(&self) -> bool {
         self.edge_ratio > 1.18
     }
 
-    /// Checks that the face is under uniaxial load, as it was at a first load: it grows by less
-    /// than a quarter, and outline and pressure keep their shapes.
+    /// Checks that the face is under uniaxial load, compared with a first load: its area changes by
+    /// less than a quarter, and outline and pressure keep their shapes.
     ///
     /// # Errors
     /// [`ShapeProblem::Grows`], [`ShapeProblem::OutlineChanges`] or
@@ -117,12 +119,12 @@ impl FaceReading {
     /// ```
     pub fn check_against(&self, first: &Self) -> Result<(), ShapeProblem> {
         let growth = self.area_m2.value / first.area_m2.value - 1.0;
-        // A squeeze of a quarter at a Poisson ratio of ½.
+        // A compression of a quarter at a Poisson ratio of ½.
         if growth.abs() > 0.25 {
             return Err(ShapeProblem::Grows { growth });
         }
-        // The area is good to 1e-4. A face that grows on one side, or by its corners alone, changes
-        // the outline's moment by a third of the growth.
+        // The area is accurate to 1e-4. If a face grows on one side only, or only at its corners,
+        // the moment of the outline changes by a third of the growth.
         let change = self.outline_moment / first.outline_moment - 1.0;
         if change.abs() > 4e-3 {
             return Err(ShapeProblem::OutlineChanges { change });
@@ -151,26 +153,26 @@ impl FaceReading {
 )]
 #[non_exhaustive]
 pub enum ShapeProblem {
-    /// The pressure falls to zero at the outline, as a ball's does.
+    /// The pressure falls to zero at the outline, as under a ball.
     #[error(
         "the pressure falls off towards the outline ({edge_ratio:.2} of that further inside), as \
          under a ball: give shape = \"sphere\" with its radius_m"
     )]
     NoEdge {
-        /// Light just inside the outline over that further inside.
+        /// Light just inside the outline, relative to the light further inside.
         edge_ratio: f64,
     },
-    /// The pressure rises to the outline.
+    /// The pressure rises towards the outline.
     #[error(
         "the pressure rises towards the outline ({edge_ratio:.2} of that further inside), as under \
          a stiff punch or a face that sticks: give shape = \"flat_punch\", or press with less \
          friction"
     )]
     RaisedEdge {
-        /// Light just inside the outline over that further inside.
+        /// Light just inside the outline, relative to the light further inside.
         edge_ratio: f64,
     },
-    /// The frame's edge cuts the contact.
+    /// The edge of the frame cuts the contact.
     #[error(
         "the frame's edge cuts the contact: move the object, or give its shape and size if it is a \
          ball"
@@ -183,16 +185,16 @@ pub enum ShapeProblem {
         .others + 1
     )]
     Several {
-        /// How many beside the largest.
+        /// Number of contacts besides the largest.
         others: usize,
     },
-    /// The contact is too small, or too irregular, to have an inside.
+    /// The contact is too small or too irregular to have an interior.
     #[error(
         "the contact is too small for its outline to be told from its inside: it takes some 20 \
          pixels across"
     )]
     TooSmall,
-    /// The contact grows by more than a squeezed specimen's face.
+    /// The contact grows more than the face of a compressed specimen.
     #[error(
         "the contact grows by {:.0} % since the first load, more than a squeezed face: a round \
          object; give its shape",
@@ -202,24 +204,24 @@ pub enum ShapeProblem {
         /// Relative growth of the area since the first load.
         growth: f64,
     },
-    /// The outline does not keep its shape from load to load.
+    /// The outline changes its shape from load to load.
     #[error(
         "the outline does not keep its shape ({:+.1} % in second moment since the first load): no \
          uniaxial load; give the object's shape",
         100.0 * .change
     )]
     OutlineChanges {
-        /// Relative change of its second moment since the first load.
+        /// Relative change of the second moment of the outline since the first load.
         change: f64,
     },
-    /// The pressure does not keep its distribution from load to load.
+    /// The pressure changes its distribution from load to load.
     #[error(
         "the pressure does not keep its distribution ({:+.1} % in second moment since the first \
          load): friction, tilt or an object of another shape",
         100.0 * .change
     )]
     PressureChanges {
-        /// Relative change of its second moment since the first load.
+        /// Relative change of the second moment of the light since the first load.
         change: f64,
     },
 }

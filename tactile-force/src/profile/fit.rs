@@ -1,4 +1,4 @@
-//! Least squares on the rings: the Gauss–Newton iteration for the profile's parameters, and the
+//! Least squares on the rings: Gauss–Newton iteration for the parameters of the profile, and the
 //! misfit beyond the noise.
 
 use nalgebra::{SMatrix, SVector};
@@ -32,7 +32,7 @@ use crate::region::Region;
 ///     Ok(m.profile.map(|p| p.shape))
 /// };
 /// assert_eq!(shape(&|r| 150.0 * (1.0 - r * r).max(0.0).sqrt())?, Some(ProfileShape::Hertz));
-/// // Even pressure, as under a soft pad.
+/// // Uniform pressure, as under a soft pad.
 /// assert_eq!(shape(&|r| if r < 1.0 { 150.0 } else { 0.0 })?, Some(ProfileShape::NotHertz));
 /// # Ok::<(), ForceError>(())
 /// ```
@@ -40,12 +40,13 @@ use crate::region::Region;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum ProfileShape {
-    /// The pressure is Hertz's, or with a [`bend`](HertzFit::bend) that of a ball at finite strain,
-    /// to within the misfit that the noise and a smooth guide explain.
+    /// The pressure is Hertzian, or that of a ball at finite strain if there is a
+    /// [`bend`](HertzFit::bend), within the misfit explained by noise and a smooth guide.
     Hertz,
-    /// Not a ball's profile: the misfit stands out of the noise and exceeds 1 % of the peak along
-    /// the radius, or 3 % around it. The contact radius is that of the profile with its `bend`: for
-    /// a ball at finite strain within 0.03 %, for other objects no more than a size.
+    /// The profile is not that of a ball: the misfit exceeds the noise, and 1 % of the peak along
+    /// the radius or 3 % around it. The contact radius is that of the profile with its `bend`:
+    /// accurate to 0.03 % for a ball at finite strain, and only a measure of size for other
+    /// objects.
     NotHertz,
 }
 
@@ -80,8 +81,8 @@ pub enum ProfileShape {
 pub struct HertzFit {
     /// Centre [x, y] in pixels.
     pub centre_px: [Estimate; 2],
-    /// Contact radius in units of the pixel's width, with the errors of noise and of the profile's
-    /// law: a hundredth of a pixel and 0.03 % of the radius, which repeated frames share.
+    /// Contact radius in units of the pixel width, with the errors of noise and of the profile's
+    /// law: a hundredth of a pixel and 0.03 % of the radius, which are common to repeated frames.
     pub radius_px: Uncertain,
     /// Contact radius in metres.
     pub radius_m: Uncertain,
@@ -89,32 +90,32 @@ pub struct HertzFit {
     pub peak: Estimate,
     /// Standard deviation of the blur, in pixels.
     pub blur_px: f64,
-    /// c of p₀ √(1 − r²/a²) (1 − c r²/a²). Zero where the Hertz profile fits to within the noise.
-    /// Balls of finite strain on soft layers press harder at the rim (c < 0, to −0.3), balls
-    /// flattened on a stiff base less (c > 0, to 0.15).
+    /// c of p₀ √(1 − r²/a²) (1 − c r²/a²). Zero if the Hertz profile fits within the noise. Balls
+    /// at finite strain on soft layers press harder at the rim (c < 0, to −0.3), balls flattened on
+    /// a stiff base less (c > 0, to 0.15).
     pub bend: Estimate,
     /// Integral of the profile, 2π/3 A a² (1 − 2c/5) in grey levels × pixels.
     pub integrated_pixel_value: Estimate,
     /// Covariance of [peak, radius, blur variance, x, y], in grey levels and pixels.
     pub covariance: [[f64; 5]; 5],
-    /// Residual variance over the noise model's: near 1 if the contact is that of a ball.
+    /// Residual variance relative to the noise model. It is close to 1 for the contact of a ball.
     pub reduced_chi_squared: f64,
-    /// Root mean square misfit of the mean level at each radius, the noise's share subtracted,
-    /// relative to the peak.
+    /// Root mean square misfit of the mean level at each radius, relative to the peak and corrected
+    /// for the noise.
     pub radial_misfit: f64,
-    /// Root mean square misfit around the centre, the noise's and the radial share subtracted,
-    /// relative to the peak.
+    /// Root mean square misfit around the centre, relative to the peak and corrected for the noise
+    /// and the radial misfit.
     pub azimuthal_misfit: f64,
-    /// Whether the misfits are those of a ball.
+    /// Whether the misfits are compatible with a ball.
     pub shape: ProfileShape,
-    /// Steps taken.
+    /// Number of steps.
     pub iterations: usize,
     /// Why the fit stopped.
     pub stop: StopReason,
 }
 
 impl HertzFit {
-    /// The fit of a profile in other units of its level, as pressures for grey levels.
+    /// Converts the fit to other units of its level, such as pressures instead of grey levels.
     pub(crate) fn with_levels_scaled(mut self, factor: f64) -> Self {
         self.peak = self.peak * factor;
         self.integrated_pixel_value = self.integrated_pixel_value * factor;
@@ -124,12 +125,12 @@ impl HertzFit {
     }
 }
 
-/// Variance along one axis of a position spread evenly over a pixel.
+/// Variance along one axis of a position distributed uniformly over a pixel.
 const PIXEL: f64 = 1.0 / 12.0;
-/// Greatest bend that is fitted. Balls on soft layers reach −0.3, balls flattened on glass +0.15.
-/// Beyond ±0.6 the profile is no ball's.
+/// Largest bend that is fitted. Balls on soft layers reach −0.3, balls flattened on glass +0.15.
+/// Beyond ±0.6 the profile is not that of a ball.
 const LARGEST_BEND: f64 = 0.6;
-/// Steps of a fit. A clean contact takes 5 to 8.
+/// Maximum number of steps of a fit. A clean contact takes 5 to 8.
 const MAX_ITERATIONS: usize = 50;
 
 /// Fits Hertz profiles. Holds the table of the blurred edge.
@@ -138,7 +139,7 @@ pub(crate) struct HertzFitter {
     edge: BlurredEdge,
 }
 
-/// Where a fit starts: the contact's centroid, equivalent radius and integral, in pixels of its
+/// Start values of a fit: centroid, equivalent radius and integral of the contact, in pixels of its
 /// region.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Start {
@@ -147,14 +148,14 @@ pub(crate) struct Start {
     pub integral: f64,
 }
 
-/// What is fitted, and how pixels count.
+/// The data of a fit and the weights of the pixels.
 #[derive(Clone, Copy)]
 struct Data<'a> {
     region: &'a Region,
     variance: PixelVariance<'a>,
     /// Height of a pixel over its width.
     aspect: f64,
-    /// About the contact's, in pixels.
+    /// Approximate contact radius, in pixels.
     radius: f64,
 }
 
@@ -186,8 +187,8 @@ impl HertzFitter {
     ) -> Option<HertzFit> {
         let place = region.place?;
         let aspect = pixel_size_m[1] / pixel_size_m[0];
-        // Of Hertz's profile with this integral, 2π/3 A a² over pixels `aspect` times as high as
-        // wide.
+        // Peak of Hertz's profile with this integral, 2π/3 A a² over pixels `aspect` times as high
+        // as wide.
         let peak =
             1.5 * start.integral * aspect / (std::f64::consts::PI * start.radius * start.radius);
         let mut state = State {
@@ -220,7 +221,7 @@ impl HertzFitter {
         self.report(&state, &equations, misfit, origin, pixel_size_m)
     }
 
-    /// The profile with a bend, if that explains the misfit of Hertz's.
+    /// The profile with a bend, if it explains the misfit of Hertz's profile.
     fn bend(
         &self,
         rings: &mut Rings,
@@ -237,18 +238,18 @@ impl HertzFitter {
         let equations = self.assemble(rings, &state, data.variance);
         let chi2 = equations.chi2;
         let left = Misfit::of(rings, &self.edge, &state.shape, data.variance, chi2);
-        // Share of the misfit that a bend must take away to be accepted. Contacts by finite
-        // elements lose nine tenths and more. Where the light is not quite proportional, saturates,
-        // or is rough, a bend takes away a tenth and makes the radius worse (`cargo test -p
-        // tactile-force --test suite sensor`).
+        // Fraction of the misfit that a bend must explain to be accepted. For contacts by finite
+        // elements it explains nine tenths and more. If the light is slightly non-linear, saturated
+        // or rough, a bend explains a tenth and makes the radius worse
+        // (`cargo test -p tactile-force --test suite sensor`).
         let explained = left.radial < 0.5 * misfit.radial;
         state.iterations += hertz.iterations;
         (explained && state.shape.bend.abs() < LARGEST_BEND).then_some((state, equations, left))
     }
 
-    /// Fits and gathers the rings anew until the centre stays. `None` too where it leaves the
-    /// region by more than the region's size: rings about such a centre, which the pixels do not
-    /// determine, would be without number.
+    /// Alternates the fit and the gathering of rings until the centre converges. `None` if it
+    /// leaves the region by more than the region's size: such a centre is not determined by the
+    /// pixels, and would need an unlimited number of rings.
     fn refine(&self, rings: &mut Rings, data: &Data<'_>, state: &mut State) -> Option<()> {
         let place = data.region.place?;
         let farthest = 2.0 * (place.rows() + place.columns()) as f64;
@@ -266,11 +267,11 @@ impl HertzFitter {
         is_near(state.centre).then_some(())
     }
 
-    /// Gauss–Newton steps on fixed rings until nothing moves. Returns how far the centre went, in
-    /// pixels.
+    /// Gauss–Newton steps on fixed rings until they converge. Returns the displacement of the
+    /// centre, in pixels.
     ///
-    /// Weights follow the shape, so χ² may rise by a hair near the end: only a step that makes it
-    /// clearly worse is halved.
+    /// The weights depend on the shape, so χ² may rise slightly near the end: only a step that
+    /// makes it clearly worse is halved.
     fn descend(
         &self,
         rings: &Rings,
@@ -284,7 +285,8 @@ impl HertzFitter {
         while state.iterations < MAX_ITERATIONS {
             state.iterations += 1;
             let step = here.normal.cholesky()?.solve(&here.gradient);
-            // The centre enters linearly on fixed rings: its best shift belongs to the final shape.
+            // The centre enters linearly on fixed rings, so its best shift belongs to the final
+            // shape.
             shift = [step[X], step[Y]];
             let mut trial = self.stepped(state, &step);
             let mut there = self.assemble(rings, &trial, variance);
@@ -295,12 +297,12 @@ impl HertzFitter {
                 trial = self.stepped(state, &(step * 0.5_f64.powi(halving)));
                 there = self.assemble(rings, &trial, variance);
             }
-            // Steps in which a ball's profile has long settled, however far from it the fit starts.
+            // Number of steps after which a ball's profile has converged from any start.
             let no_ball = state.iterations >= 12 && there.is_no_ball(trial.shape.peak);
-            // Least fall of χ² in a step, as a share, of a profile that is no ball's: there blur
-            // and radius wander along a valley without end, and their values mean nothing.
+            // Minimum relative decrease of χ² per step for a profile that is not a ball's: its blur
+            // and radius drift along a valley indefinitely, and their values are meaningless.
             if no_ball && there.chi2 > 0.99 * here.chi2 {
-                // The better of the two, about the centre as it is.
+                // The better of the two, with the current centre.
                 if there.chi2 < here.chi2 {
                     state.shape = trial.shape;
                 }
@@ -323,9 +325,9 @@ impl HertzFitter {
         let shape = &state.shape;
         let stepped = Shape {
             peak: shape.peak + step[0],
-            // A full step from a poor start can leave the range in which the linear model holds.
+            // A full step from a poor start can leave the range of the linear model.
             radius: (shape.radius + step[RADIUS]).clamp(0.5 * shape.radius, 2.0 * shape.radius),
-            // A pixel's own width is the least blur.
+            // The width of a pixel is the minimum blur.
             blur: (shape.blur + step[BLUR]).clamp(PIXEL, 4.0 * shape.blur),
             bend: (shape.bend + step[BEND]).clamp(-LARGEST_BEND, LARGEST_BEND),
         };
@@ -335,8 +337,8 @@ impl HertzFitter {
         }
     }
 
-    /// Normal equations over all pixels of the rings. The row of a bend that is not fitted is that
-    /// of the identity.
+    /// Normal equations over all pixels of the rings. If the bend is not fitted, its row is that of
+    /// the identity.
     fn assemble(&self, rings: &Rings, state: &State, variance: PixelVariance<'_>) -> Equations {
         let shape = &state.shape;
         let mut e = Equations::zeros();
@@ -345,8 +347,8 @@ impl HertzFitter {
             let r2 = ring.place[3] / n;
             let spread = (ring.r4 / n - r2 * r2).max(0.0);
             let level = level(&self.edge, shape, r2, spread);
-            // By the variance at the fitted level: at the measured one, pixels dark by noise would
-            // weigh more.
+            // The variance is that at the fitted level. With that at the measured level, pixels
+            // dark by noise would get a higher weight.
             let weight = 1.0 / variance.at(level.value);
             e.add(ring, &level, weight, r2, spread);
         }
@@ -361,7 +363,7 @@ impl HertzFitter {
         e
     }
 
-    /// The parameters' covariance, scaled by the residuals and in pixels along both axes, and the
+    /// The parameter covariance, scaled by the residuals and in pixels along both axes, and the
     /// reduced χ².
     fn covariance(
         &self,
@@ -375,9 +377,10 @@ impl HertzFitter {
         }
         let fitted = if state.bent { PARAMETERS } else { BEND };
         let reduced = equations.chi2 / (equations.pixels - fitted as f64).max(1.0);
-        // By the residuals: the noise model's own error and a misfit widen all errors alike.
+        // Scaled by the residuals: an error of the noise model and a misfit widen all errors
+        // equally.
         covariance *= reduced;
-        // The fit counts rows in pixel widths, the report in rows.
+        // The fit measures rows in pixel widths, the report in rows.
         covariance.row_mut(Y).unscale_mut(aspect);
         covariance.column_mut(Y).unscale_mut(aspect);
         Some((covariance, reduced))
@@ -394,8 +397,8 @@ impl HertzFitter {
         let aspect = pixel_size_m[1] / pixel_size_m[0];
         let (covariance, reduced) = self.covariance(state, equations, aspect)?;
         let s = &state.shape;
-        // Balls by finite elements are read 0.00 to 0.05 % too small by cameras of 350 to 1,400
-        // pixels. A rim of whole pixels and the blur add some hundredths of a pixel.
+        // For balls by finite elements, the radius is 0.00 to 0.05 % too small with cameras of 350
+        // to 1,400 pixels. Discretisation of the rim and blur add several hundredths of a pixel.
         let radius_law_px = 0.01_f64.hypot(3e-4 * s.radius);
         let radius_px = Uncertain::from(Estimate::from_variance(
             s.radius,
@@ -424,7 +427,7 @@ impl HertzFitter {
     }
 }
 
-/// Integral of the profile, 2π/3 A a² (1 − 2c/5) over a pixel's area, and its error.
+/// Integral of the profile, 2π/3 A a² (1 − 2c/5) over the area of a pixel, and its error.
 fn integral(s: &Shape, covariance: &Normal, aspect: f64) -> Estimate {
     let hertz = 2.0 / 3.0 * std::f64::consts::PI / aspect * s.radius;
     let volume = hertz * (1.0 - 0.4 * s.bend);
@@ -440,7 +443,7 @@ fn integral(s: &Shape, covariance: &Normal, aspect: f64) -> Estimate {
     Estimate::from_variance(volume * s.radius * s.peak, variance)
 }
 
-/// Nothing moves by more than a millionth.
+/// Whether no parameter changed by more than a millionth.
 fn settled(before: &Shape, after: &Shape) -> bool {
     let close = |a: f64, b: f64, scale: f64| (a - b).abs() <= 1e-6 * scale.abs();
     close(before.radius, after.radius, after.radius)
@@ -449,12 +452,12 @@ fn settled(before: &Shape, after: &Shape) -> bool {
         && close(before.bend, after.bend, 1.0)
 }
 
-/// Peak, radius, blur variance, centre's x and y, bend.
+/// Peak, radius, blur variance, x and y of the centre, bend.
 const PARAMETERS: usize = 6;
 type Normal = SMatrix<f64, PARAMETERS, PARAMETERS>;
 type Step = SVector<f64, PARAMETERS>;
 
-/// Places among the parameters.
+/// Indices of the parameters.
 const RADIUS: usize = 1;
 const BLUR: usize = 2;
 const X: usize = 3;
@@ -481,10 +484,10 @@ impl Equations {
         }
     }
 
-    /// Adds one ring's pixels. Only the lower triangle of the normal matrix is filled.
+    /// Adds the pixels of one ring. Only the lower triangle of the normal matrix is filled.
     ///
     /// Along a ring the model is its level, to first order in r² − mean r². A shift of the centre
-    /// changes it by −2 (dI/dr²) times the place.
+    /// changes it by −2 (dI/dr²) times the position.
     fn add(&mut self, ring: &Ring, l: &Level, weight: f64, r2: f64, spread: f64) {
         let [n, u, v, sum_r2] = ring.place;
         let [uu, uv, r2u, r2v] = ring.product;
@@ -517,38 +520,38 @@ impl Equations {
         self.normal[(Y, Y)] += square * (sum_r2 - uu);
         self.gradient[X] += slope * (du - along(u, r2u));
         self.gradient[Y] += slope * (dv - along(v, r2v));
-        // Along a ring the model itself varies. That is no misfit.
+        // The variation of the model itself along a ring is not a misfit.
         let within = n * l.by_r2 * l.by_r2 * spread;
         self.chi2 += weight * (dd - 2.0 * l.value * d + n * l.value * l.value - within);
         self.pixels += n;
         self.weights += weight * n;
     }
 
-    /// Whether the residuals of a profile of that peak are neither noise nor what finite strain
-    /// leaves.
+    /// Whether the residuals of a profile with this peak are neither noise nor an effect of finite
+    /// strain.
     fn is_no_ball(&self, peak: f64) -> bool {
-        // Root mean square residual, as a share of the peak, beyond which a profile is no ball's:
-        // contacts by finite elements have 2 %, flat faces 10 % and more.
+        // Root mean square residual, relative to the peak, above which a profile is not that of a
+        // ball: contacts by finite elements have 2 %, flat faces 10 % and more.
         let limit = 0.05 * peak;
-        // Squared residuals over the noise's from which on they are the profile's, not the noise's.
+        // Ratio of squared residuals to the noise above which they come from the profile.
         self.chi2 > 2.0 * self.pixels && self.chi2 > limit * limit * self.weights
     }
 }
 
-/// Misfit of a fitted profile as shares of its peak.
+/// Misfit of a fitted profile, relative to its peak.
 #[derive(Clone, Copy, Debug)]
 struct Misfit {
     radial: f64,
     azimuthal: f64,
     shape: ProfileShape,
-    /// Whether the misfit along the radius stands out of the noise, however small it is.
+    /// Whether the radial misfit is significant, even if it is small.
     stands_out: bool,
 }
 
 impl Misfit {
     /// Splits χ² of all pixels into that of the rings' means and the rest. With weights w = 1/σ²
-    /// the noise adds one a ring and one a pixel, so that (χ² − number)/Σw is the mean square of
-    /// the misfit.
+    /// the noise adds one per ring and one per pixel, so (χ² − number)/Σw is the mean square of the
+    /// misfit.
     fn of(
         rings: &Rings,
         edge: &BlurredEdge,
@@ -570,20 +573,21 @@ impl Misfit {
             count += 1.0;
         }
         let share = |excess: f64| (excess.max(0.0) / weights).sqrt() / shape.peak;
-        // χ² of all pixels splits into that of the means and that about the means.
+        // χ² of all pixels is the sum of that of the means and that about the means.
         let around_chi2 = chi2 - radial_chi2;
         let radial = share(radial_chi2 - count);
         let azimuthal = share(around_chi2 - (pixels - count));
         let stands_out =
-            // Standard deviations by which a sum of squares must exceed that of the noise.
+            // Number of standard deviations by which a sum of squares must exceed that of the
+            // noise.
             |chi2: f64, number: f64| chi2 > number + 5.0 * (2.0 * number).sqrt();
         let radial_stands_out = stands_out(radial_chi2, count);
-        // Radial misfit, as a share of the peak, beyond which a profile is not Hertz's. Blur, whole
-        // grey levels and the depth of a guide ten times the contact leave 0.2 % or less. Light ∝
-        // p^1.2 taken for pressure 0.8 %, a flat punch 10 %.
+        // Radial misfit, relative to the peak, above which a profile is not Hertzian. Blur,
+        // rounding to grey levels and the depth of a guide ten times the contact give 0.2 % or
+        // less. Light ∝ p^1.2 interpreted as pressure gives 0.8 %, a flat punch 10 %.
         let not_radial = radial > 0.01 && radial_stands_out;
-        // The same around the centre, where the noise model's own error counts: an ellipse of 1.2
-        // to 1 has 4 %.
+        // Corresponding misfit around the centre, which includes the error of the noise model: an
+        // ellipse of 1.2 to 1 has 4 %.
         let not_round = azimuthal > 0.03 && stands_out(around_chi2, pixels - count);
         Self {
             radial,
@@ -598,7 +602,7 @@ impl Misfit {
     }
 }
 
-/// Number of levels at which a tabulated variance is known.
+/// Number of levels of a tabulated variance.
 pub(crate) const VARIANCE_LEVELS: usize = 65;
 
 /// Variance of one pixel at a level of the profile.

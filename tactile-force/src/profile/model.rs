@@ -1,32 +1,32 @@
 //! The blurred pressure profile and its derivatives.
 //!
-//! Its base is E √(z + N)₊ for a standard normal N: a square-root edge blurred by a Gaussian. With
-//! h(z) for that mean, h″ = ½ h − z h′ (√ is homogeneous of degree ½ and Gaussian means obey the
-//! heat equation), so every derivative follows from h and h′: h⁽ⁿ⁺²⁾ = (½ − n) h⁽ⁿ⁾ − z h⁽ⁿ⁺¹⁾. At
-//! zero h(0) = Γ(¾)/(2^¾ √π), h′(0) = Γ(¼)/(2^(9/4) √π).
+//! It is based on E √(z + N)₊ for a standard normal N: a square-root edge blurred by a Gaussian.
+//! Let h(z) be this mean. Then h″ = ½ h − z h′ (√ is homogeneous of degree ½, and Gaussian means
+//! obey the heat equation), so every derivative follows from h and h′: h⁽ⁿ⁺²⁾ = (½ − n) h⁽ⁿ⁾ − z
+//! h⁽ⁿ⁺¹⁾. At zero h(0) = Γ(¾)/(2^¾ √π) and h′(0) = Γ(¼)/(2^(9/4) √π).
 
-/// Nodes every quarter from −8 to 16. Below h < 1e-15, above the asymptotic series is exact to
-/// 1e-9.
+/// Nodes at every quarter from −8 to 16. Below this range h < 1e-15; above it the asymptotic series
+/// is accurate to 1e-9.
 const LOW: f64 = -8.0;
 const HIGH: f64 = 16.0;
 const STEP: f64 = 0.25;
 const NODES: usize = 97;
 const TERMS: usize = 9;
 
-/// Taylor coefficients of h about every node.
+/// Taylor coefficients of h about each node.
 #[derive(Clone, Debug)]
 pub(super) struct BlurredEdge {
     table: Vec<[f64; TERMS]>,
 }
 
 impl BlurredEdge {
-    /// Steps the differential equation away from zero in both directions.
+    /// Integrates the differential equation from zero in both directions.
     pub(super) fn new() -> Self {
         const H0: f64 = 0.411_089_479_331_229_4;
         const D0: f64 = 0.430_019_993_662_259_85;
         let mut table = vec![[0.0; TERMS]; NODES];
         let zero = (-LOW / STEP) as usize;
-        // From zero, where h and h′ are known in closed form.
+        // The start is zero, where h and h′ have closed forms.
         for direction in [1.0, -1.0] {
             let (mut h, mut d) = (H0, D0);
             let mut node = zero;
@@ -55,7 +55,7 @@ impl BlurredEdge {
         if z >= HIGH - 0.5 * STEP {
             return far(z);
         }
-        // So far outside the edge the light is below rounding.
+        // At this distance outside the edge the light is below rounding.
         if z <= LOW {
             return [0.0; 6];
         }
@@ -70,7 +70,7 @@ impl BlurredEdge {
     }
 }
 
-/// √z and what the Gaussian adds to it, Σ g⁽²ᵏ⁾(z)/(2ᵏ k!), differentiated term by term.
+/// √z plus the Gaussian corrections, Σ g⁽²ᵏ⁾(z)/(2ᵏ k!), differentiated term by term.
 fn far(z: f64) -> [f64; 6] {
     let root = z.sqrt();
     let (i, i2) = (1.0 / z, 1.0 / (z * z));
@@ -105,18 +105,18 @@ fn horner_derivative(c: &[f64], t: f64) -> f64 {
         .fold(0.0, |sum, (k, c)| sum * t + k as f64 * c)
 }
 
-/// What the profile depends on, lengths in pixels.
+/// The parameters of the profile. Lengths are in pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shape {
     pub peak: f64,
     pub radius: f64,
-    /// Variance of the blur along one axis, the 1/12 of the pixel included.
+    /// Variance of the blur along one axis, including the 1/12 of the pixel.
     pub blur: f64,
     /// c of √(1 − r²/a²) (1 − c r²/a²). Zero is Hertz's profile.
     pub bend: f64,
 }
 
-/// Grey level at a distance from the centre, and its derivatives.
+/// Grey level at a distance from the centre, with its derivatives.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Level {
     pub value: f64,
@@ -129,7 +129,7 @@ pub(super) struct Level {
 }
 
 /// Mean of a power of (1 − |r + ε|²/a²)₊ under the blur, and its derivatives by the cumulants of
-/// what is raised.
+/// the base.
 #[derive(Clone, Copy, Debug)]
 struct Power {
     value: f64,
@@ -151,17 +151,14 @@ impl Power {
     }
 }
 
-/// A E √x₊ (1 − c + c x) with x = 1 − |r + ε|²/a², ε normal with the blur's variance w along
+/// A E √x₊ (1 − c + c x) with x = 1 − |r + ε|²/a², where ε is normal with the blur variance w along
 /// each axis.
 ///
-/// |r + ε|² is w times a noncentral χ² with two degrees of freedom: mean r² + 2w, variance 4r²w +
-/// 4w², third cumulant 24 r²w² + 16 w³. The mean of the root is that of a normal variable,
-/// corrected for the skewness (Edgeworth). The error is of order (blur/a)². `spread` is the
-/// variance of r² among the pixels that share this distance.
+/// |r + ε|² is w times a noncentral χ² with two degrees of freedom: mean r² + 2w, variance 4r²w + 4w², third cumulant 24 r²w² + 16 w³. The mean of the root is that of a normal variable, corrected for the skewness (Edgeworth). The error is of order (blur/a)². `spread` is the variance of r² among the pixels of this ring.
 pub(super) fn level(edge: &BlurredEdge, shape: &Shape, r2: f64, spread: f64) -> Level {
     let (w, inverse) = (shape.blur, 1.0 / (shape.radius * shape.radius));
     let inverse2 = inverse * inverse;
-    // Cumulants of x, which is one less a scaled noncentral χ².
+    // Cumulants of x, which is one minus a scaled noncentral χ².
     let mean = 1.0 - (r2 + 2.0 * w) * inverse;
     let variance = (4.0 * r2 * w + 4.0 * w * w + spread) * inverse2;
     let skew = -(24.0 * r2 * w * w + 16.0 * w * w * w) * inverse2 * inverse;
@@ -169,7 +166,7 @@ pub(super) fn level(edge: &BlurredEdge, shape: &Shape, r2: f64, spread: f64) -> 
     let z = mean / sd;
     let h = edge.derivatives(z);
     let q = skew / (6.0 * variance * sd);
-    // √x = √sd √(z + N): the root of the standard deviation scales the tabulated edge.
+    // √x = √sd √(z + N): the tabulated edge is scaled by the root of the standard deviation.
     let scale = sd.sqrt();
     let root = Power {
         value: scale * (h[0] + q * h[3]),

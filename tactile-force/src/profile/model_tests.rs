@@ -34,7 +34,7 @@ fn derivatives_of_the_edge_agree_with_differences() {
             edge.derivatives(z),
         );
         for k in 0..5 {
-            // Differences: e² h⁽ᵏ⁺³⁾/6. Far series: its last term.
+            // Differences: e² h⁽ᵏ⁺³⁾/6. Asymptotic series: its last term.
             let slope = (above[k] - below[k]) / (2.0 * e);
             assert!(
                 (slope - here[k + 1]).abs() < 2e-6,
@@ -75,7 +75,7 @@ fn derivatives_agree_with_differences() {
                 (here.by_r2, central(&|e| at(shape, r * r + e).value)),
             ];
             for (k, (slope, difference)) in slopes.into_iter().enumerate() {
-                // Differences: e² times a third derivative of some hundreds, over six.
+                // Differences: e² times a third derivative of several hundred, over six.
                 assert!(
                     (slope - difference).abs() < 2e-6 * (1.0 + slope.abs()),
                     "r {r}, bend {bend}, {k}: {slope} {difference}"
@@ -111,7 +111,7 @@ fn level_is_the_blurred_profile() {
                 weights += weight;
             }
         }
-        // The Edgeworth series leaves (blur/a)² at the edge.
+        // The Edgeworth series has an error of (blur/a)² at the edge.
         assert!(
             (level(&edge, &shape, r * r, 0.0).value - sum / weights).abs() < 5e-4,
             "r = {r}"

@@ -1,36 +1,36 @@
-//! Pixels gathered into thin rings about a centre, well inside in blocks.
+//! Pixels gathered into thin rings about a centre, in blocks if they are well inside.
 
 use std::ops::Range;
 
 use crate::region::Region;
 use tactile_core::{Loop, vectorised};
 
-/// Rings a quarter of a pixel wide at the contact's edge, one pixel further in and four pixels
-/// where the profile hardly bends. Reused from fit to fit.
+/// Rings that are a quarter of a pixel wide at the edge of the contact, one pixel further in, and
+/// four pixels where the profile hardly bends. They are reused from fit to fit.
 ///
-/// Where rings are wide, pixels are added in blocks, with the sums over all pixels of a block: only
-/// the ring is that of the block's centre.
+/// Where rings are wide, pixels are added in blocks, with exact sums over the pixels of a block:
+/// only the choice of the ring uses the centre of the block.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Rings {
     rings: Vec<Ring>,
-    /// The longest run of the aperture in every row, and what of it was added in blocks: columns
-    /// from and to.
+    /// The longest run of the aperture in each row, and the columns of it that were added in
+    /// blocks.
     spans: Vec<[usize; 2]>,
     taken: Vec<[usize; 2]>,
 }
 
-/// Pixels whose rings are found at once.
+/// Number of pixels whose rings are computed together.
 const AT_ONCE: usize = 16;
 
 impl Rings {
-    /// Every ring that has pixels.
+    /// All rings that contain pixels.
     pub(crate) fn filled(&self) -> impl Iterator<Item = &Ring> {
         self.rings.iter().filter(|ring| ring.place[0] > 0.0)
     }
 
-    /// Gathers the pixels of the aperture. The centre is relative to the region's first pixel.
-    /// `aspect` is the pixel's height over its width, and distances are in pixel widths. `radius`
-    /// is about that of the contact.
+    /// Gathers the pixels of the aperture. The centre is relative to the first pixel of the region.
+    /// `aspect` is the pixel height over its width, and distances are in pixel widths. `radius` is
+    /// the approximate contact radius.
     pub(crate) fn gather(&mut self, region: &Region, centre: [f64; 2], aspect: f64, radius: f64) {
         let Self {
             rings,
@@ -44,17 +44,17 @@ impl Rings {
         }
         for run in &region.aperture {
             let span = &mut spans[run.row as usize];
-            // Blocks need unbroken rows. Pixels of shorter runs in the row are added one by one.
+            // Blocks need contiguous rows. Pixels of shorter runs in a row are added one by one.
             if run.len() > span[1] - span[0] {
                 *span = [run.start as usize, run.end as usize];
             }
         }
         let inside = |depth: f64| (radius - depth).max(0.0).floor();
-        // How far inside the edge pixels are added in blocks of four by four, and rings are four
-        // pixels wide. At the edge of that disc a² − r² is ten times its change from the middle of
-        // a ring to its border, whose spread in r² the level takes into account: the remainder is
-        // of the fourth order, 1e-5 of the level. `cargo bench -p tactile-benches --bench
-        // work_precision -- force` shows the error.
+        // Distance inside the edge at which pixels are added in blocks of four by four and rings
+        // are four pixels wide. At the edge of this disc a² − r² is ten times its change from the
+        // middle of a ring to its border. The level takes the spread of r² into account, so the
+        // remaining error is of fourth order, 1e-5 of the level.
+        // `cargo bench -p tactile-benches --bench work_precision -- force` shows the error.
         let wide = inside(20.0);
         let pixels = std::f64::consts::PI * wide * wide / aspect;
         vectorised(Gather {
@@ -67,10 +67,10 @@ impl Rings {
                 spans,
             },
             wide,
-            // The same for blocks of two by two and rings one pixel wide.
+            // Corresponding distance for blocks of two by two and rings one pixel wide.
             near: inside(8.0),
-            // Pixels well inside the edge beyond which some blocks are left out there: the profile
-            // is flat and they only repeat each other.
+            // Number of pixels well inside the edge above which some blocks are skipped: the
+            // profile is flat there, and they add little information.
             step: (pixels / 8192.0).sqrt().ceil().max(1.0) as usize,
         });
     }
@@ -84,12 +84,12 @@ struct Gather<'a> {
     /// Distances up to which rings are four pixels and one pixel wide.
     wide: f64,
     near: f64,
-    /// Of the large blocks every n-th row and column is gathered.
+    /// Every n-th row and column of the large blocks is gathered.
     step: usize,
 }
 
 impl Gather<'_> {
-    /// Number of the ring at a distance, which grows by a quarter, by one and by four a pixel.
+    /// Index of the ring at a distance. It increases by a quarter, by one and by four per pixel.
     #[inline(always)]
     fn ring(&self, r: f64) -> usize {
         let flat = 0.25 * r;
@@ -97,13 +97,12 @@ impl Gather<'_> {
         let edge = 4.0 * r - 0.75 * self.wide - 3.0 * self.near;
         let inner = if bent > flat { bent } else { flat };
         let place = if edge > inner { edge } else { inner };
-        // Rounds to the nearest whole number, which then stands in the last digits. A conversion
-        // that minds its limits has no wide instruction. Between 2⁵² and 2⁵³ a double has whole
-        // numbers alone.
+        // Rounds to the nearest integer, which is then in the last digits, because between 2⁵² and
+        // 2⁵³ doubles are integers. A saturating conversion has no SIMD instruction.
         (place - 0.5 + 6_755_399_441_055_744.0).to_bits() as u32 as usize
     }
 
-    /// As many rings as the farthest pixel of the aperture needs, all empty.
+    /// Creates as many empty rings as the farthest pixel of the aperture needs.
     #[inline(always)]
     fn clear(&mut self) {
         let mut farthest = 0.0_f64;
@@ -143,7 +142,7 @@ impl Gather<'_> {
         }
     }
 
-    /// Adds blocks side by side, of which `row` and `columns` are the first row and all columns.
+    /// Adds adjacent blocks. `row` is their first row, and `columns` are all their columns.
     #[inline(always)]
     fn blocks<const SIDE: usize>(&mut self, row: usize, columns: Range<usize>, step: usize) {
         let width = self.region.columns();
@@ -174,7 +173,7 @@ impl Gather<'_> {
         }
     }
 
-    /// Adds pixels side by side of a row.
+    /// Adds adjacent pixels of a row.
     #[inline(always)]
     fn pixels(&mut self, row: usize, columns: Range<usize>) {
         let v = self.grid.v(row as f64);
@@ -182,7 +181,7 @@ impl Gather<'_> {
         let first = row * self.region.columns();
         let differences = &self.region.difference[first + columns.start..first + columns.end];
         for differences in differences.chunks(AT_ONCE) {
-            // Always for as many, by wide instructions.
+            // A fixed number of pixels, for SIMD instructions.
             let (mut squares, mut places) = ([0.0; AT_ONCE], [0; AT_ONCE]);
             for k in 0..AT_ONCE {
                 let u = start + f64::from(k as i32);
@@ -216,7 +215,7 @@ impl Loop for Gather<'_> {
         for run in aperture {
             let (row, start, end) = (run.row as usize, run.start as usize, run.end as usize);
             let [from, to] = self.taken[row];
-            // The run that blocks were taken from: only what is left at both sides of them.
+            // The run from which blocks were taken: only the remaining pixels on both sides.
             if from < to && start <= from && to <= end {
                 self.pixels(row, start..from);
                 self.pixels(row, to..end);
@@ -227,8 +226,9 @@ impl Loop for Gather<'_> {
     }
 }
 
-/// Sums over the pixels of one ring. (u, v) is a pixel's place relative to the centre, d its
-/// difference. Four by four, so that a pixel is added with a few wide instructions.
+/// Sums over the pixels of one ring. (u, v) is the position of a pixel relative to the centre, and
+/// d its difference. The sums are in groups of four, so that a pixel is added with a few SIMD
+/// instructions.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Ring {
     /// Σ 1, Σ u, Σ v, Σ r².
@@ -266,38 +266,38 @@ impl Ring {
     }
 }
 
-/// Where blocks lie: a corner of four of them is beside the centre, so that they are the same
-/// whichever way the image is mirrored, turned or moved.
+/// Positions of blocks. A corner of four blocks is next to the centre, so that the blocks are the
+/// same if the image is mirrored, rotated or shifted.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid<'a> {
     /// Column and row of the centre.
     pub centre: [f64; 2],
-    /// A pixel's height over its width.
+    /// Height of a pixel over its width.
     pub aspect: f64,
-    /// Columns of every row that blocks may use, from and to.
+    /// Range of columns in each row that blocks may use.
     pub spans: &'a [[usize; 2]],
 }
 
 impl Grid<'_> {
-    /// A column relative to the centre.
+    /// Position of a column relative to the centre.
     #[inline(always)]
     pub(super) fn u(&self, column: f64) -> f64 {
         column - self.centre[0]
     }
 
-    /// A row relative to the centre, in pixel widths.
+    /// Position of a row relative to the centre, in pixel widths.
     #[inline(always)]
     pub(super) fn v(&self, row: f64) -> f64 {
         (row - self.centre[1]) * self.aspect
     }
 
-    /// The first column (`axis` 0) or row (1) beyond the centre, where a block begins.
+    /// The first column (`axis` 0) or row (1) beyond the centre, where a block starts.
     #[inline(always)]
     pub(super) fn first(&self, axis: usize) -> isize {
         self.centre[axis].floor() as isize + 1
     }
 
-    /// The number of a block counted from the centre to either side, by its first column or row.
+    /// The index of a block counted from the centre to either side, by its first column or row.
     #[inline(always)]
     pub(super) fn number<const SIDE: usize>(&self, at: isize, axis: usize) -> usize {
         let away = (at - self.first(axis)).div_euclid(SIDE as isize);
@@ -308,8 +308,8 @@ impl Grid<'_> {
         }
     }
 
-    /// The columns of whole blocks in rows from `row` on, all of whose pixels lie within a distance
-    /// of the centre and in the rows' spans.
+    /// The columns of whole blocks in rows from `row` on, whose pixels are all within a distance of
+    /// the centre and in the spans of the rows.
     #[inline(always)]
     pub(super) fn columns<const SIDE: usize>(&self, row: isize, distance: f64) -> Range<usize> {
         let Some(spans) = usize::try_from(row)
@@ -340,8 +340,8 @@ impl Grid<'_> {
     }
 }
 
-/// A block of pixels: its differences, and where its centre is relative to that of the contact, in
-/// pixel widths.
+/// A block of pixels: its differences, and the position of its centre relative to that of the
+/// contact, in pixel widths.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RingBlock<const SIDE: usize> {
     pub pixels: [[f32; SIDE]; SIDE],
@@ -362,8 +362,8 @@ impl<const SIDE: usize> RingBlock<SIDE> {
         sums
     };
 
-    /// What the pixels one by one add to a ring. With u + p and v + q the place of a pixel, sums of
-    /// odd powers of p and q vanish.
+    /// The sums that the pixels would add to a ring one by one. The position of a pixel is u + p
+    /// and v + q; sums of odd powers of p and q vanish.
     #[inline(always)]
     pub(super) fn sums(&self) -> Ring {
         let (u, v, side) = (self.u, self.v, SIDE as f64);
@@ -372,8 +372,8 @@ impl<const SIDE: usize> RingBlock<SIDE> {
         let aspect2 = self.aspect * self.aspect;
         let [qq, qqqq] = [aspect2 * pp, aspect2 * aspect2 * pppp];
         let (u2, v2) = (u * u, v * v);
-        // Over one row and one column: the square, of which the block has as many as its side.
-        // Σ(u + p)² over a row is side u² + Σp², since Σp vanishes about the block's centre.
+        // Sums over one row and one column: the block has as many of them as its side. Σ(u + p)²
+        // over a row is side u² + Σp², because Σp vanishes about the centre of the block.
         let (row_uu, column_vv) = (side * u2 + pp, side * v2 + qq);
         let (uu, vv) = (side * row_uu, side * column_vv);
         let r2u = u * (uu + 2.0 * side * pp + vv);
@@ -389,7 +389,7 @@ impl<const SIDE: usize> RingBlock<SIDE> {
         }
     }
 
-    /// Σ d, Σ d p, Σ d q and Σ d², q in rows.
+    /// Σ d, Σ d p, Σ d q and Σ d², with q in rows.
     #[inline(always)]
     fn differences(&self) -> [f64; 4] {
         let (mut columns, mut squares) = ([0.0; SIDE], [0.0; SIDE]);

@@ -1,6 +1,6 @@
 use super::*;
 
-/// Pixels of whole quarters: sums of a block are those of its pixels to rounding.
+/// For pixels at multiples of a quarter, the sums of a block equal those of its pixels to rounding.
 fn compare<const SIDE: usize>(aspect: f64) {
     let value = |k: usize, j: usize| (k * 7 + j * 13 % 5) as f32 - 9.25;
     let block = RingBlock::<SIDE> {
@@ -37,8 +37,8 @@ fn a_block_is_its_pixels() {
     }
 }
 
-/// Mirrored about a centre that is not in the middle of a pixel: the blocks are mirrored, too, and
-/// counted alike.
+/// If the image is mirrored about a centre that is not in the middle of a pixel, the blocks are
+/// mirrored too and counted equally.
 #[test]
 fn blocks_are_mirrored_with_the_image() {
     let size = 40;

@@ -12,7 +12,7 @@ fn integrals_are_those_of_the_slope() {
         sum += step * basis.weights(d).dot(&slopes);
         if k % 10_000 == 9_999 {
             let found = basis.integrals(d + 0.5 * step).dot(&slopes);
-            // Midpoints are exact but at the knots, where a step holds a corner.
+            // The midpoint rule is exact except at the knots, where a step contains a corner.
             assert!((found - sum).abs() < 1e-5, "{d}: {found} {sum}");
         }
     }
@@ -21,7 +21,8 @@ fn integrals_are_those_of_the_slope() {
 }
 
 proptest! {
-    /// The Karush–Kuhn–Tucker conditions: nothing negative, no gain from any coefficient.
+    /// The Karush–Kuhn–Tucker conditions: no coefficient is negative, and no change of a
+    /// coefficient is an improvement.
     #[test]
     fn solutions_satisfy_the_conditions_of_a_minimum(
         numbers in proptest::collection::vec(-1.0_f64..1.0, KNOTS * (KNOTS + 1))
@@ -33,7 +34,7 @@ proptest! {
         let gradient = right - normal * x;
         for j in 0..KNOTS {
             prop_assert!(x[j] >= 0.0);
-            // Rounding of thirteen products of order one.
+            // Rounding error of thirteen products of order one.
             prop_assert!(gradient[j] < 1e-9);
             let complementary = if free[j] { gradient[j].abs() < 1e-9 } else { x[j] == 0.0 };
             prop_assert!(complementary);
