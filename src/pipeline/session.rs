@@ -472,7 +472,7 @@ impl Session {
     ///
     /// # Errors
     /// [`PipelineError::NoContact`] without contact, and the errors of the strain of a
-    ///  [`Press`](crate::pipeline::Press).
+    /// [`Press`](crate::pipeline::Press).
     pub fn strain(&mut self) -> Result<Option<&SessionStrain>, PipelineError> {
         let frame = Frame {
             reading: self.last_reading()?,

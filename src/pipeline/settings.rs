@@ -42,7 +42,7 @@ pub enum SurfaceInput {
 }
 
 /// Settings of a pipeline besides its stages, changed by
-///  [`Pipeline::with_settings`](super::Pipeline::with_settings).
+/// [`Pipeline::with_settings`](super::Pipeline::with_settings).
 ///
 /// ```
 /// use tactile_imaging::pipeline::{Binning, Object, Pipeline, Settings};

@@ -88,7 +88,7 @@ macro_rules! choice {
 
 choice! {
     /// From an image to a surface, under frontal light. For other light use
-    ///  [`Pipeline::with_surface`](super::Pipeline::with_surface).
+    /// [`Pipeline::with_surface`](super::Pipeline::with_surface).
     ///
     /// ```
     /// use tactile_imaging::pipeline::ReconstructionChoice;

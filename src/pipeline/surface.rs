@@ -72,7 +72,7 @@ impl ContactSurface {
     }
 
     /// Fits a ball, with the radius of the smallest mean absolute error. `None` as for
-    ///  [`fit_ball`](Self::fit_ball).
+    /// [`fit_ball`](Self::fit_ball).
     pub fn fit_any_ball(&self) -> Option<BallFit> {
         self.fit(BallFit::of_any_radius)
     }

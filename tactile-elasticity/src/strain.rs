@@ -37,7 +37,7 @@ pub trait StrainMeasure: Send + Sync {
     ///
     /// # Errors
     /// [`ElasticityError::NotFinite`]. For measures that need F⁻¹ or U, also
-    ///  [`ElasticityError::SingularDeformation`] and [`ElasticityError::InvertedDeformation`].
+    /// [`ElasticityError::SingularDeformation`] and [`ElasticityError::InvertedDeformation`].
     ///
     /// ```
     /// use nalgebra::Matrix3;

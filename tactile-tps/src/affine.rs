@@ -1,4 +1,4 @@
-//! Affine maps and rigid motions of least squares.
+//! Least-squares affine maps and rigid motions.
 
 use nalgebra::{DMatrix, Point, SMatrix, SVector};
 
@@ -10,7 +10,7 @@ use crate::{
     span::{principal_axes, rounding},
 };
 
-/// The affine map f(x) = A x + b. A rigid motion where A is a rotation. [`Default`] is the
+/// The affine map f(x) = A x + b. It is a rigid motion if A is a rotation. [`Default`] is the
 /// identity.
 ///
 /// ```
@@ -27,12 +27,12 @@ pub struct Affine<const D: usize> {
     pub linear: SMatrix<f64, D, D>,
     /// The image b of the origin.
     pub offset: SVector<f64, D>,
-    /// Rank of [1 X] of the points it was fitted to.
+    /// Rank of the matrix [1 X] of the points used for the fit.
     rank: usize,
 }
 
 impl<const D: usize> Default for Affine<D> {
-    /// The map that leaves every point where it is.
+    /// The identity.
     fn default() -> Self {
         Self::new(SMatrix::identity(), SVector::zeros())
     }
@@ -56,12 +56,12 @@ impl<const D: usize> Affine<D> {
         }
     }
 
-    /// The map of least Σ wᵢ |A xᵢ + b − yᵢ|²: A = Yᵀ X (XᵀX)⁺ + N for sources X and targets Y,
-    /// about their weighted means and times √w.
+    /// The map that minimises Σ wᵢ |A xᵢ + b − yᵢ|²: A = Yᵀ X (XᵀX)⁺ + N for sources X and targets
+    /// Y, taken relative to their weighted means and multiplied by √w.
     ///
-    /// It comes from the singular values of X, so that directions of a millionth of the extent keep
-    /// their digits. Along those that the points do not span the identity stands: N projects on
-    /// them. See [`Warp::rank`]. O(n).
+    /// It is computed from the singular values of X, so that directions with a millionth of the
+    /// extent keep their digits. Along directions that the points do not span it is the identity: N
+    /// projects on them. See [`Warp::rank`]. O(n).
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -77,7 +77,7 @@ impl<const D: usize> Affine<D> {
     /// ```
     ///
     /// # Errors
-    /// [`TpsError`] for no points, lengths that differ, or numbers that are not finite.
+    /// [`TpsError`] for no points, lengths that differ, or non-finite numbers.
     pub fn fit(
         sources: &[Point<f64, D>],
         targets: &[Point<f64, D>],
@@ -88,10 +88,10 @@ impl<const D: usize> Affine<D> {
         Ok(clouds.map(clouds.general()))
     }
 
-    /// The rigid motion of least Σ wᵢ |R xᵢ + b − yᵢ|², R a rotation (no reflection): the one
-    /// nearest to C = Σ w y xᵀ (Kabsch 1976; Umeyama 1991). O(n).
+    /// The rigid motion that minimises Σ wᵢ |R xᵢ + b − yᵢ|², with a rotation R (no reflection):
+    /// the rotation closest to C = Σ w y xᵀ (Kabsch 1976; Umeyama 1991). O(n).
     ///
-    /// Of the rotations that the points do not tell apart, it is the least one.
+    /// If the points do not determine the rotation, the smallest possible rotation is chosen.
     ///
     /// ```
     /// use nalgebra::{Point2, Rotation2};
@@ -107,7 +107,7 @@ impl<const D: usize> Affine<D> {
     /// ```
     ///
     /// # Errors
-    /// [`TpsError`] for no points, lengths that differ, or numbers that are not finite.
+    /// [`TpsError`] for no points, lengths that differ, or non-finite numbers.
     pub fn fit_rigid(
         sources: &[Point<f64, D>],
         targets: &[Point<f64, D>],
@@ -131,7 +131,7 @@ impl<const D: usize> Warp<D> for Affine<D> {
     }
 }
 
-/// Sources and targets of a map.
+/// Sources and targets of a fit.
 #[derive(Default)]
 struct Clouds<const D: usize> {
     sources: Cloud<D>,
@@ -139,7 +139,7 @@ struct Clouds<const D: usize> {
 }
 
 impl<const D: usize> Clouds<D> {
-    /// Takes pairs, in the memory of the last ones.
+    /// Stores pairs, reusing memory.
     fn take(
         &mut self,
         sources: &[Point<f64, D>],
@@ -152,25 +152,25 @@ impl<const D: usize> Clouds<D> {
         Ok(())
     }
 
-    /// The Jacobian of least squares.
+    /// The least-squares Jacobian.
     fn general(&self) -> SMatrix<f64, D, D> {
         let (x, y) = (&self.sources, &self.targets);
         let (mut linear, mut across) = (SMatrix::zeros(), SMatrix::identity());
         for &(direction, size, k) in x.spanned() {
-            // The image of the direction, in the frames' units.
+            // The image of the direction, in the units of the frames.
             let column = x.column(k);
             let image = SVector::from_fn(|i, _| dot(y.plain(i), column) / size / size);
             linear += image * direction.transpose() * (y.frame.scale / x.frame.scale);
             across -= direction * direction.transpose();
         }
-        // Without the rounding of I − I.
+        // Avoids the rounding of I − I.
         if x.spanned().len() < D {
             linear += across;
         }
         linear
     }
 
-    /// The map with this Jacobian that takes the sources' mean to the targets'.
+    /// The map with this Jacobian that maps the mean of the sources to that of the targets.
     fn map(&self, linear: SMatrix<f64, D, D>) -> Affine<D> {
         Affine {
             linear,
@@ -180,16 +180,17 @@ impl<const D: usize> Clouds<D> {
     }
 }
 
-/// Points about their weighted mean, times the roots of their weights, in a frame of unit size.
+/// Points relative to their weighted mean, multiplied by the roots of their weights, in a frame of
+/// unit size.
 struct Cloud<const D: usize> {
     frame: Frame<D>,
     mean: SVector<f64, D>,
-    /// Coordinates, axis by axis.
+    /// Coordinates, by axes.
     plain: Vec<f64>,
-    /// The same along the principal directions, in the order in which those were found.
+    /// Coordinates along the principal directions, in the order of their computation.
     turned: Vec<f64>,
-    /// Principal directions, the size along each and its column, falling. The first `rank` of them
-    /// are spanned.
+    /// Principal directions, the extent along each and its column, in descending order. The first
+    /// `rank` of them are spanned.
     directions: [(SVector<f64, D>, f64, usize); D],
     rank: usize,
 }
@@ -254,15 +255,15 @@ impl<const D: usize> Cloud<D> {
     }
 }
 
-/// The rotation R of greatest tr(Rᵀ C), C = Σ w y xᵀ = U S Vᵀ.
+/// The rotation R that maximises tr(Rᵀ C), with C = Σ w y xᵀ = U S Vᵀ.
 ///
-/// C is formed along the principal directions of both clouds, whose sizes may differ by many
-/// decades. Where it has no singular value above rounding, R is as near to the identity as the
-/// other directions allow.
+/// C is computed along the principal directions of both clouds, whose sizes may differ by many
+/// decades. If a singular value is below rounding, R is as close to the identity as the other
+/// directions permit.
 fn rotation<const D: usize>(x: &Cloud<D>, y: &Cloud<D>) -> SMatrix<f64, D, D> {
     let rank = x.rank.min(y.rank);
     let (from, to) = (&x.directions[..rank], &y.directions[..rank]);
-    // Column b of C, along the targets' directions.
+    // Column b of C, along the directions of the targets.
     let mut columns = vec![0.0; D * D];
     for (b, &(.., source)) in from.iter().enumerate() {
         for (a, &(.., target)) in to.iter().enumerate() {
@@ -282,7 +283,7 @@ fn rotation<const D: usize>(x: &Cloud<D>, y: &Cloud<D>) -> SMatrix<f64, D, D> {
         }
     }
     pairs.sort_by(|a, b| b.2.total_cmp(&a.2));
-    // Rounding of the sums, along directions of these sizes.
+    // Rounding error of the sums, for directions of these sizes.
     let count = (x.plain.len() / D) as f64;
     let noise = |k: usize| 4.0 * f64::EPSILON * count.sqrt() * from[k].1 * to[k].1;
     let found = pairs.iter().enumerate();
@@ -290,8 +291,7 @@ fn rotation<const D: usize>(x: &Cloud<D>, y: &Cloud<D>) -> SMatrix<f64, D, D> {
     let mut turned = SMatrix::<f64, D, D>::zeros();
     let (mut left, mut right) = (SMatrix::identity(), SMatrix::identity());
     for (k, (u, v, _)) in pairs[..found].iter().enumerate() {
-        // Falling factors above one: of all directions that a reflection turns, the weakest is
-        // turned.
+        // Descending factors above one, so that a reflection reverses the weakest direction.
         turned += u * v.transpose() * (1 + D - k) as f64;
         left -= u * u.transpose();
         right -= v * v.transpose();
@@ -302,14 +302,14 @@ fn rotation<const D: usize>(x: &Cloud<D>, y: &Cloud<D>) -> SMatrix<f64, D, D> {
     nearest_rotation(&turned)
 }
 
-/// The rotation R that maximises tr(Rᵀ C): U diag(1, …, det(U Vᵀ)) Vᵀ of the singular value
+/// The rotation R that maximises tr(Rᵀ C): U diag(1, …, det(U Vᵀ)) Vᵀ from the singular value
 /// decomposition.
 fn nearest_rotation<const D: usize>(cross: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
     let svd = DMatrix::from_fn(D, D, |i, j| cross[(i, j)]).svd(true, true);
     let (Some(mut u), Some(vt)) = (svd.u, svd.v_t) else {
         return SMatrix::identity();
     };
-    // A reflection would be nearer. Turning the weakest direction costs the least.
+    // A reflection would be closer. Reversing the weakest direction costs the least.
     if (&u * &vt).determinant() < 0.0 {
         let smallest = svd.singular_values.imin();
         u.column_mut(smallest).neg_mut();
@@ -318,7 +318,7 @@ fn nearest_rotation<const D: usize>(cross: &SMatrix<f64, D, D>) -> SMatrix<f64, 
     SMatrix::from_fn(|i, j| rotation[(i, j)])
 }
 
-/// The [`WarpModel`] of affine maps: all of them, or rotations and translations alone.
+/// The [`WarpModel`] of affine maps: all of them, or rotations and translations only.
 ///
 /// ```
 /// use nalgebra::{Point2, Vector2};

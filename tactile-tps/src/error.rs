@@ -1,4 +1,4 @@
-//! Errors, each with the numbers that locate it, and the checks of arguments that raise them.
+//! Errors with the values that locate them, and the argument checks that raise them.
 
 use nalgebra::Point;
 use tactile_core::CustomError;
@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use crate::Smoothing;
 
-/// Everything that can go wrong in this crate.
+/// The errors of this crate.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -21,87 +21,87 @@ use crate::Smoothing;
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TpsError {
-    /// There is nothing to fit: no point at all, or none with a weight above zero.
+    /// There is nothing to fit: no point, or none with a positive weight.
     #[error("no {0} to fit")]
     Empty(&'static str),
-    /// Two arguments that belong together differ in length.
+    /// Two corresponding arguments differ in length.
     #[error("{input}: expected {expected} of them, found {found}")]
     Length {
         /// The argument of the wrong length.
         input: &'static str,
-        /// How many there should be.
+        /// Expected length.
         expected: usize,
-        /// How many there are.
+        /// Length found.
         found: usize,
     },
     /// A coordinate is NaN or infinite.
     #[error("{input}: number {index} (from zero) is not finite")]
     NotFinite {
-        /// The argument that holds it.
+        /// The argument that contains it.
         input: &'static str,
-        /// Its position, counted from zero.
+        /// Its index, counted from zero.
         index: usize,
     },
     /// A weight is negative, NaN or infinite.
     #[error("weight {index} (from zero) is {value}, expected a finite number of at least zero")]
     Weight {
-        /// Its position, counted from zero.
+        /// Its index, counted from zero.
         index: usize,
-        /// What was found there.
+        /// The value found.
         value: f64,
     },
     /// The smoothing parameter is negative, NaN or infinite.
     #[error("smoothing parameter {value}, expected a finite number of at least zero")]
     Lambda {
-        /// What was given.
+        /// The value given.
         value: f64,
     },
-    /// The tolerance below which a direction counts as not spanned is outside `[0, 1)`.
+    /// The rank tolerance, below which a direction counts as not spanned, is outside `[0, 1)`.
     #[error("rank tolerance {value}, expected a number from 0 to below 1")]
     RankTolerance {
-        /// What was given.
+        /// The value given.
         value: f64,
     },
-    /// The residual at which to stop iterating is outside `(0, 1)`.
+    /// The residual at which iteration stops is outside `(0, 1)`.
     #[error("tolerance {value}, expected a number above 0 and below 1")]
     Tolerance {
-        /// What was given.
+        /// The value given.
         value: f64,
     },
-    /// The caller's callback stopped the fit before there was a spline.
+    /// The caller's callback stopped the fit before a spline existed.
     #[error("stopped by the caller")]
     Stopped,
-    /// Two source points coincide, their targets differ, and no smoothing was asked for.
+    /// Two source points coincide, their targets differ, and there is no smoothing.
     #[error(
         "source points {first} and {second} coincide but their targets differ: smooth, or drop one"
     )]
     Conflict {
-        /// The earlier of the two.
+        /// Index of the earlier point.
         first: usize,
-        /// The later of the two.
+        /// Index of the later point.
         second: usize,
     },
     /// Cross-validation needs more points than the polynomial has coefficients.
     #[error("cross-validation needs more than {needed} distinct points, found {found}")]
     TooFewForValidation {
-        /// Coefficients of the polynomial.
+        /// Number of coefficients of the polynomial.
         needed: usize,
-        /// Distinct points of positive weight.
+        /// Number of distinct points of positive weight.
         found: usize,
     },
-    /// The kernel's matrix is not positive definite on the complement of the affine functions.
+    /// The kernel matrix is not positive definite on the complement of the affine functions.
     #[error("kernel is not conditionally positive definite on these points (column {column})")]
     NotDefinite {
-        /// Column of the projected matrix whose pivot failed.
+        /// Column of the projected matrix with the failed pivot.
         column: usize,
     },
-    /// A user's own model or warp failed.
+    /// A user-defined model or warp failed.
     #[error(transparent)]
     Custom(CustomError),
 }
 
 impl TpsError {
-    /// The failure of a user's own model, as an error or a message.
+    /// Wraps the error or message of a user-defined model.
     ///
     /// ```
     /// use tactile_tps::TpsError;
@@ -113,7 +113,7 @@ impl TpsError {
     }
 }
 
-/// Names the first point with a coordinate that is not finite.
+/// Reports the first point with a non-finite coordinate.
 pub(crate) fn finite<const D: usize>(
     points: &[Point<f64, D>],
     input: &'static str,
@@ -125,7 +125,7 @@ pub(crate) fn finite<const D: usize>(
     }
 }
 
-/// Arguments that belong together are equally long.
+/// Checks that corresponding arguments have equal lengths.
 pub(crate) fn same_count(
     input: &'static str,
     expected: usize,
@@ -141,12 +141,13 @@ pub(crate) fn same_count(
     })
 }
 
-/// The output is as long as the input.
+/// Checks that output and input have equal lengths.
 pub(crate) fn same_length(expected: usize, found: usize) -> Result<(), TpsError> {
     same_count("output slice", expected, found)
 }
 
-/// At least one pair, all finite, with weights that are valid where they are given.
+/// Checks that there is at least one pair, that all coordinates are finite, and that weights, if
+/// given, are valid.
 pub(crate) fn validate_pairs<const D: usize>(
     sources: &[Point<f64, D>],
     targets: &[Point<f64, D>],
@@ -161,7 +162,8 @@ pub(crate) fn validate_pairs<const D: usize>(
     weights.map_or(Ok(()), |weights| validate_weights(weights, sources.len()))
 }
 
-/// One weight a point, finite and not negative, one of them positive.
+/// Checks that there is one weight per point, finite and not negative, and that at least one is
+/// positive.
 pub(crate) fn validate_weights(weights: &[f64], points: usize) -> Result<(), TpsError> {
     same_count("weights", points, weights.len())?;
     let valid = |&w: &f64| w >= 0.0 && w.is_finite();
@@ -175,7 +177,7 @@ pub(crate) fn validate_weights(weights: &[f64], points: usize) -> Result<(), Tps
     Ok(())
 }
 
-/// A λ is finite and not negative.
+/// Checks that λ is finite and not negative.
 pub(crate) fn validate_smoothing(smoothing: &Smoothing) -> Result<(), TpsError> {
     match *smoothing {
         Smoothing::Lambda(lambda) if !(lambda >= 0.0 && lambda.is_finite()) => {

@@ -1,4 +1,4 @@
-//! The fitted spline: values, Jacobians and Hessians at one point or many, its parts and its
+//! The fitted spline: values, Jacobians and Hessians at one or many points, its terms and its
 //! energy.
 
 use nalgebra::{Point, SMatrix, SVector};
@@ -13,7 +13,7 @@ use crate::{
     lanes::{Job, Lane, UNIT_ROUNDOFF, dispatch},
 };
 
-/// The affine part of a spline in its frame.
+/// The affine part of a spline, in its frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct AffinePart<const D: usize, const M: usize> {
     constant: [f64; M],
@@ -22,32 +22,33 @@ struct AffinePart<const D: usize, const M: usize> {
 
 /// A thin-plate spline from `D`-space to `M`-space: f(x) = a₀ + A x + Σᵢ wᵢ U(|x − xᵢ|).
 ///
-/// [`Default`] is the spline that is zero everywhere.
+/// [`Default`] is the zero spline.
 /// The weights satisfy Σ wᵢ = 0 and Σ wᵢ xᵢᵀ = 0 and minimise Σ weightᵢ |f(xᵢ) − yᵢ|² + λ wᵀKw
 /// (Wahba 1990).
 ///
-/// With as many outputs as axes it is a map of space: along directions that the source points do
-/// not span it keeps the identity ([`Warp::rank`](crate::Warp::rank)). Another function is constant
-/// along them.
+/// With as many outputs as axes it is a map of space: it is the identity along directions that the
+/// source points do not span ([`Warp::rank`](crate::Warp::rank)). With another number of outputs it
+/// is constant along them.
 #[derive(Clone, Debug)]
 pub struct Spline<const D: usize, const M: usize, K = R2LogR> {
     kernel: K,
     frame: Frame<D>,
-    /// Centres in the frame, axis by axis.
+    /// Centres in the frame, by axes.
     centres: Vec<f64>,
-    /// Weights in the frame, output by output.
+    /// Weights in the frame, by outputs.
     weights: Vec<f64>,
     affine: AffinePart<D, M>,
     /// Largest Σ |wᵢ| of an output.
     weight: f64,
     /// Largest target.
     level: f64,
-    /// How the fit went.
+    /// Report of the fit.
     pub report: FitReport,
 }
 
 impl<const D: usize, const M: usize, K: Kernel + Default> Default for Spline<D, M, K> {
-    /// A spline that is zero everywhere, to be filled by [`Factorization::refit_with`](crate::Factorization::refit_with).
+    /// The zero spline, to be filled by
+    /// [`Factorization::refit_with`](crate::Factorization::refit_with).
     fn default() -> Self {
         Self::zero(K::default())
     }
@@ -71,12 +72,12 @@ impl<const D: usize, const M: usize, K: Kernel + Default> Default for Spline<D, 
 /// ```
 pub type ThinPlateSpline<const D: usize, K = R2LogR> = Spline<D, D, K>;
 
-/// A solution in the frame, as a spline takes it over.
+/// A solution in the frame, from which a spline is filled.
 pub(crate) struct Solution<'a, const D: usize, const M: usize> {
     pub(crate) frame: Frame<D>,
-    /// Coordinates of the centres, axis by axis.
+    /// Coordinates of the centres, by axes.
     pub(crate) axes: &'a [Vec<f64>; D],
-    /// Weights of the centres, output by output.
+    /// Weights of the centres, by outputs.
     pub(crate) weights: &'a [f64],
     pub(crate) constant: [f64; M],
     pub(crate) gradient: [[f64; D]; M],
@@ -85,7 +86,7 @@ pub(crate) struct Solution<'a, const D: usize, const M: usize> {
 }
 
 impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
-    /// A spline that is zero everywhere, to be filled by a fit.
+    /// The zero spline, to be filled by a fit.
     pub(crate) fn zero(kernel: K) -> Self {
         Self {
             kernel,
@@ -102,7 +103,7 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
         }
     }
 
-    /// Takes over a solution, reusing memory where it suffices.
+    /// Stores a solution, reusing memory if possible.
     pub(crate) fn assign(&mut self, kernel: &K, solution: &Solution<'_, D, M>) {
         self.kernel.clone_from(kernel);
         self.frame = solution.frame;
@@ -126,20 +127,19 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
         });
     }
 
-    /// Rounding error to expect of the sum at squared distance `s` from the frame's centre.
+    /// Expected rounding error of the sum at squared distance `s` from the centre of the frame.
     fn rounding(&self, s: f64) -> f64 {
-        // The farthest centre lies a unit or so beyond. Nearer than two units the terms do not
-        // shrink.
+        // The farthest centre is about one unit further away. Below two units the terms do not
+        // become smaller.
         let distance = f64::max(s.sqrt() + 1.0, 2.0);
         let term = self.kernel.derivatives(distance * distance).value;
         UNIT_ROUNDOFF * self.weight * term.abs()
     }
 
-    /// Decimal digits that the sum of the spline's terms keeps at a point.
+    /// Number of accurate decimal digits of the sum of the spline's terms at a point.
     ///
-    /// That is −log₁₀ of the rounding error to expect, relative to the value or the targets,
-    /// whichever is larger.
-    /// Far from the points the number falls: the terms grow faster than the sum.
+    /// It is −log₁₀ of the expected rounding error, relative to the value or the targets, whichever
+    /// is larger. Far from the points it decreases, because the terms grow faster than the sum.
     /// Values with few digits are better replaced by those of the [affine part](Self::affine).
     ///
     /// ```
@@ -165,10 +165,10 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
         digits(self.rounding(distance_squared) / f64::max(size, self.level))
     }
 
-    /// wᵀKw, summed over the outputs, in the kernel's own units. O(n²).
+    /// wᵀKw, summed over the outputs, in the units of the kernel. O(n²).
     ///
-    /// In the plane with r² ln r, and in space with −r, the integral ∫ |∂²f|² of all second
-    /// derivatives is 8π times this.
+    /// For r² ln r in the plane, and −r in space, the integral ∫ |∂²f|² of all second derivatives
+    /// is 8π times this value.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -193,7 +193,7 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
         let mut negative = vec![0.0; M * self.count()];
         sum.subtract(centres, 0..self.count(), &mut negative);
         let products = self.weights.iter().zip(&negative).map(|(w, r)| -w * r);
-        // An affine spline has the energy 0, which rounding can make negative.
+        // The energy of an affine spline is 0, which rounding can make negative.
         f64::max(products.sum(), 0.0) / self.unit()
     }
 
@@ -202,8 +202,8 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
         self.centres.len() / D
     }
 
-    /// The terms of the kernel sum, each with its centre xᵢ and its weight wᵢ in the kernel's
-    /// units: the distinct source points, in their order.
+    /// The terms of the kernel sum, each with its centre xᵢ and its weight wᵢ in the units of the
+    /// kernel: the distinct source points, in order.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -234,11 +234,11 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
         })
     }
 
-    /// The affine part x ↦ A x + a₀ beside the kernel sum, in the points' units.
+    /// The affine part x ↦ A x + a₀ in addition to the kernel sum, in the units of the points.
     ///
-    /// Kernels are scaled to unit size inside. A kernel like r² ln r changes by a multiple of r² by
-    /// that.
-    /// Its sum is affine by the side conditions and is accounted for here.
+    /// Kernels are scaled to unit size internally. This changes a kernel such as r² ln r by a
+    /// multiple of r². By the side conditions the sum of these multiples is affine, and it is
+    /// included here.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -262,8 +262,7 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
         let Frame { centre, scale } = self.frame;
         let linear = SMatrix::from_fn(|i, j| self.affine.gradient[i][j] / scale);
         let kernel = |s: f64| self.kernel.derivatives(s).value;
-        // What the scaling of the kernel leaves, per r². For r² ln r it is the logarithm of the
-        // scale.
+        // Remainder of the kernel's scaling, per r². For r² ln r it is the logarithm of the scale.
         let square = kernel(scale * scale) / self.unit() - kernel(1.0);
         let n = self.count();
         let offset = SVector::from_fn(|i, _| {
@@ -277,12 +276,12 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
         (linear, offset)
     }
 
-    /// How much larger the kernel is outside than in the frame.
+    /// Ratio of the kernel outside to that in the frame.
     fn unit(&self) -> f64 {
         self.frame.scale.powi(self.kernel.degree().unwrap_or(0))
     }
 
-    /// Coordinates of the centres and their weights, column by column.
+    /// Coordinates and weights of the centres, by columns.
     fn columns(&self) -> ([&[f64]; D], [&[f64]; M]) {
         let n = self.count();
         (
@@ -311,8 +310,8 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
         value[0]
     }
 
-    /// The Jacobian ∂fᵢ/∂xⱼ (row i, column j). At a centre of −r, which has a cusp there, its own
-    /// term is left out.
+    /// The Jacobian ∂fᵢ/∂xⱼ (row i, column j). At a centre of −r, where the kernel has a cusp, its
+    /// own term is omitted.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -337,7 +336,8 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
         jacobian[0]
     }
 
-    /// The Hessian of every output. At a centre where the kernel has none its own term is left out.
+    /// The Hessian of each output. At a centre where the kernel has no Hessian, its own term is
+    /// omitted.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -363,7 +363,7 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
         hessian[0]
     }
 
-    /// f at many points, into the caller's memory.
+    /// Writes f at many points into the caller's memory.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -393,7 +393,7 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
         Ok(())
     }
 
-    /// Jacobians at many points, into the caller's memory.
+    /// Writes Jacobians at many points into the caller's memory.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -422,7 +422,7 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
         Ok(())
     }
 
-    /// Values and Jacobians at many points in one pass, into the caller's memory.
+    /// Writes values and Jacobians at many points into the caller's memory, in one pass.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -435,7 +435,7 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
     /// let queries = [Point2::new(0.5, 0.5), Point2::new(0.1, 0.9)];
     /// let (mut values, mut jacobians) = ([Point2::origin(); 2], [nalgebra::Matrix2::zeros(); 2]);
     /// warp.apply_and_jacobian_into(&queries, &mut values, &mut jacobians)?;
-    /// // Where the warp keeps orientation and does not fold, the determinant is positive.
+    /// // The determinant is positive if the warp keeps orientation and does not fold.
     /// assert!(jacobians.iter().all(|j| j.determinant() > 0.5)
     ///     && (values[0] - queries[0]).norm() < 0.1);
     /// # Ok(())
@@ -456,7 +456,7 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
         Ok(())
     }
 
-    /// Values and derivatives up to `ORDER` at every point.
+    /// Values and derivatives up to `ORDER` at each point.
     fn evaluate<const ORDER: usize>(&self, points: &[Point<f64, D>], outputs: Outputs<'_, D, M>) {
         let (centres, weights) = self.columns();
         dispatch(Evaluation::<_, D, M, ORDER> {
@@ -473,13 +473,13 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
     }
 }
 
-/// Queries a thread takes at a time.
+/// Number of queries that a thread takes at a time.
 #[cfg(feature = "rayon")]
 const THREAD_QUERIES: usize = 8 * BLOCK;
 
 #[cfg(feature = "rayon")]
 impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
-    /// As [`apply_into`](Self::apply_into), over the threads of the current rayon pool.
+    /// Like [`apply_into`](Self::apply_into), on the threads of the current rayon pool.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -511,7 +511,7 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
         chunks.try_for_each(|(points, values)| self.apply_into(points, values))
     }
 
-    /// As [`apply_and_jacobian_into`](Self::apply_and_jacobian_into), over the threads of the
+    /// Like [`apply_and_jacobian_into`](Self::apply_and_jacobian_into), on the threads of the
     /// current rayon pool.
     ///
     /// ```
@@ -550,19 +550,19 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
     }
 }
 
-/// Decimal digits of a number with this relative error, at most those of the type.
+/// Decimal digits of a number with this relative error, limited to those of the type.
 fn digits(error: f64) -> f64 {
     f64::max(error, UNIT_ROUNDOFF).log10().min(0.0).abs()
 }
 
-/// Where values, Jacobians and Hessians of the points go. An empty slice takes none.
+/// Output slices for values, Jacobians and Hessians of the points. An empty slice is skipped.
 type Outputs<'a, const D: usize, const M: usize> = (
     &'a mut [Point<f64, M>],
     &'a mut [SMatrix<f64, M, D>],
     &'a mut [[SMatrix<f64, D, D>; M]],
 );
 
-/// Values and derivatives at all points, block by block.
+/// Computes values and derivatives at all points, block by block.
 struct Evaluation<'a, K, const D: usize, const M: usize, const ORDER: usize> {
     sum: KernelSum<'a, K, D, M>,
     affine: &'a AffinePart<D, M>,
@@ -589,12 +589,12 @@ impl<K: Kernel, const D: usize, const M: usize, const ORDER: usize> Job
 }
 
 impl<K: Kernel, const D: usize, const M: usize, const ORDER: usize> Evaluation<'_, K, D, M, ORDER> {
-    /// Evaluates at `used` ≤ `W` points from `start` on.
+    /// Evaluates at `used` ≤ `W` points starting at `start`.
     #[inline(always)]
     fn chunk<L: Lane, const W: usize>(&mut self, start: usize, used: usize) {
         let mut x = [[0.0; W]; D];
         for l in 0..W {
-            // Lanes beyond the last point repeat it, so that the loop has a fixed length.
+            // Lanes after the last point repeat it, so that the loop has a fixed length.
             let inside = self.frame.inside(&self.points[start + l.min(used - 1)]);
             (0..D).for_each(|k| x[k][l] = inside[k]);
         }
@@ -606,7 +606,7 @@ impl<K: Kernel, const D: usize, const M: usize, const ORDER: usize> Evaluation<'
         }
     }
 
-    /// Adds the affine part and returns to the units of the points.
+    /// Adds the affine part and converts to the units of the points.
     #[inline(always)]
     fn finish<L: Lane, const W: usize>(
         &mut self,
@@ -637,7 +637,7 @@ impl<K: Kernel, const D: usize, const M: usize, const ORDER: usize> Evaluation<'
         if let Some(hessian) = hessians.get_mut(at).filter(|_| ORDER > 1) {
             for m in 0..M {
                 for k in 0..D {
-                    // One half of the symmetric Hessian was summed.
+                    // Only one half of the symmetric Hessian was summed.
                     for i in 0..=k {
                         let curve = sums.hessian[m][k][i][l] / scale / scale;
                         (hessian[m][(k, i)], hessian[m][(i, k)]) = (curve, curve);

@@ -1,11 +1,11 @@
-//! The units in which points are computed with.
+//! The internal units of points.
 
 use nalgebra::Point;
 
 use crate::lanes::UNIT_ROUNDOFF;
 
-/// The shift and the scale that bring points to unit size: x̂ = (x − centre) / scale, scale a power
-/// of two.
+/// The shift and scale that bring points to unit size: x̂ = (x − centre) / scale, with a power of
+/// two as the scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Frame<const D: usize> {
     pub(crate) centre: [f64; D],
@@ -33,10 +33,10 @@ impl<const D: usize> Frame<D> {
                 high[k] = high[k].max(point[k]);
             }
         }
-        // Halved before the difference, which could overflow.
+        // Halved before the subtraction, which could overflow.
         let halves = (0..D).map(|k| 0.5 * high[k] - 0.5 * low[k]);
         let half = halves.fold(0.0, f64::max);
-        // The bits of the exponent alone: the power of two that brings `half` into [1, 2).
+        // Only the bits of the exponent: the power of two that brings `half` into [1, 2).
         let power = f64::from_bits(half.to_bits() & 0x7ff0_0000_0000_0000);
         let usable = rescale && power > 0.0 && power.is_finite();
         Self {
@@ -51,7 +51,7 @@ impl<const D: usize> Frame<D> {
         core::array::from_fn(|k| (point[k] - self.centre[k]) / self.scale)
     }
 
-    /// Rounding of the points' coordinates, in the frame's units.
+    /// Rounding error of the points' coordinates, in the units of the frame.
     pub(crate) fn grain(&self, points: &[Point<f64, D>]) -> f64 {
         let numbers = points.iter().flat_map(|p| p.iter());
         numbers.fold(0.0, |m, x| f64::max(m, x.abs())) / self.scale * UNIT_ROUNDOFF

@@ -2,17 +2,17 @@
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// What a [`Kernel`](crate::Kernel) may do with a number.
+/// The arithmetic available to a [`Kernel`](crate::Kernel).
 ///
-/// Kernels are written once against this trait and run in every arithmetic the crate needs:
-/// `f64`, with fused multiplication and addition and without.
+/// Kernels are written once with this trait and run in every arithmetic that the crate needs:
+/// `f64`, with and without fused multiply–add.
 ///
-/// Comparison is allowed. Keep both branches free of side effects and the compiler turns them into
+/// Comparisons are allowed. If both branches are free of side effects, the compiler turns them into
 /// a select.
 ///
 /// ```
 /// use tactile_tps::KernelScalar;
-/// /// ln(1 + eˣ), in whatever arithmetic it is called.
+/// /// ln(1 + eˣ), in any arithmetic.
 /// fn softplus<R: KernelScalar>(x: R) -> R {
 ///     (R::from_f64(1.0) + x.exp()).ln()
 /// }
@@ -27,19 +27,20 @@ pub trait KernelScalar:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
-    /// The nearest number to `x`.
+    /// The number nearest to `x`.
     fn from_f64(x: f64) -> Self;
     /// √x.
     fn sqrt(self) -> Self;
-    /// Natural logarithm of a positive, finite number. Elsewhere anything but a panic.
+    /// Natural logarithm of a positive, finite number. For other values the result is unspecified,
+    /// without a panic.
     fn ln(self) -> Self;
     /// eˣ.
     fn exp(self) -> Self;
-    /// `self · a + b`, rounded once where that costs nothing extra.
+    /// `self · a + b`, with a single rounding if this has no extra cost.
     ///
     /// ```
     /// use tactile_tps::KernelScalar;
-    /// /// Length of a vector, one rounding a term.
+    /// /// Length of a vector, with one rounding per term.
     /// fn length<R: KernelScalar>(components: &[R]) -> R {
     ///     components.iter().fold(R::from_f64(0.0), |sum, &c| c.mul_add(c, sum)).sqrt()
     /// }
@@ -48,10 +49,10 @@ pub trait KernelScalar:
     fn mul_add(self, a: Self, b: Self) -> Self;
 }
 
-/// A kernel's value and derivatives with respect to the **squared** distance s = r².
+/// Value and derivatives of a kernel with respect to the **squared** distance s = r².
 ///
-/// With d = x − xᵢ the term U(|d|) has the gradient `2 first d` and the Hessian `2 first I + 4
-/// second d dᵀ`.
+/// With d = x − xᵢ the term U(|d|) has the gradient `2 first d` and the Hessian
+/// `2 first I + 4 second d dᵀ`.
 ///
 /// ```
 /// use tactile_tps::{KernelDerivatives, Kernel, R3};
@@ -70,9 +71,9 @@ pub struct KernelDerivatives<R> {
 
 /// A radial function U(r) that is conditionally positive definite of order at most two.
 ///
-/// That is: Σᵢⱼ wᵢ wⱼ U(|xᵢ − xⱼ|) > 0 for distinct points and any w ≠ 0 with Σ wᵢ = 0 and Σ wᵢ xᵢ
-/// = 0. The three kernels of the crate satisfy this. An implementor writes
-/// [`derivatives`](Self::derivatives) alone.
+/// This means Σᵢⱼ wᵢ wⱼ U(|xᵢ − xⱼ|) > 0 for distinct points and any w ≠ 0 with Σ wᵢ = 0 and Σ wᵢ
+/// xᵢ = 0. The three kernels of the crate satisfy it. An implementation only needs
+/// [`derivatives`](Self::derivatives).
 ///
 /// ```
 /// use tactile_tps::{KernelDerivatives, Kernel, KernelScalar};
@@ -93,14 +94,15 @@ pub struct KernelDerivatives<R> {
 pub trait Kernel: Clone + Send + Sync {
     /// U and its derivatives with respect to s = r² ≥ 0.
     ///
-    /// At s = 0 give the limit of U. A derivative without a limit is given as 0, which leaves the
-    /// point's own term out.
+    /// At s = 0, return the limit of U. For a derivative without a limit, return 0, which omits the
+    /// point's own term.
     fn derivatives<R: KernelScalar>(&self, s: R) -> KernelDerivatives<R>;
 
     /// The degree k if U(c r) = cᵏ U(r), up to a multiple of r², for every c > 0. `None` if there
-    /// is none.
+    /// is no such degree.
     ///
-    /// Points are scaled to unit size inside when there is one. A kernel with a length scale has
+    /// If there is one, points are scaled to unit size internally. A kernel with a length scale has
+    /// none.
     /// none.
     ///
     /// ```
@@ -116,9 +118,9 @@ pub trait Kernel: Clone + Send + Sync {
     }
 }
 
-/// U(r) = r² ln r with U(0) = 0: the thin plate of the plane (m = 2, D = 2).
+/// U(r) = r² ln r with U(0) = 0: the thin-plate kernel of the plane (m = 2, D = 2).
 ///
-/// Bookstein's r² ln r² is twice this: with it the weights halve, and λ must be doubled for the
+/// Bookstein's r² ln r² is twice this: its weights are half as large, and λ must be doubled for the
 /// same spline.
 ///
 /// ```
@@ -131,20 +133,20 @@ pub trait Kernel: Clone + Send + Sync {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct R2LogR;
 
-/// U(r) = −r: the same energy in space (m = 2, D = 3). Its gradient has a cusp at each source
-/// point.
+/// U(r) = −r: the kernel with the same energy in space (m = 2, D = 3). Its gradient has a cusp at
+/// each source point.
 ///
 /// ```
 /// use tactile_tps::{Kernel, NegR};
 /// assert_eq!(NegR.derivatives(9.0).value, -3.0);
-/// assert_eq!(NegR.derivatives(0.0).first, 0.0); // the cusp, left out
+/// assert_eq!(NegR.derivatives(0.0).first, 0.0); // the cusp, omitted
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct NegR;
 
-/// U(r) = r³: one derivative smoother than −r (m = 3 in space, with an affine polynomial), and the
-/// kernel to take for smooth maps of space.
+/// U(r) = r³: one derivative smoother than −r (m = 3 in space, with an affine polynomial). Use it
+/// for smooth maps of space.
 ///
 /// ```
 /// use tactile_tps::{Kernel, R3};
@@ -154,7 +156,7 @@ pub struct NegR;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct R3;
 
-/// `x` where s > 0, else zero.
+/// `x` if s > 0, otherwise zero.
 #[inline(always)]
 fn off_centre<R: KernelScalar>(s: R, x: R) -> R {
     if s > R::from_f64(0.0) {
@@ -168,7 +170,7 @@ impl Kernel for R2LogR {
     #[inline(always)]
     fn derivatives<R: KernelScalar>(&self, s: R) -> KernelDerivatives<R> {
         let half = R::from_f64(0.5);
-        // s ln s tends to 0 at the centre, where the logarithm has no value.
+        // s ln s tends to 0 at the centre, where the logarithm is undefined.
         let log = off_centre(s, s.ln());
         let half_log = half * log;
         KernelDerivatives {

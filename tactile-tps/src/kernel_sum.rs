@@ -1,9 +1,8 @@
 //! The sum over the kernels of all centres, for blocks of queries.
 //!
-//! Queries are the lanes of vectorised loops and centres the outer loop.
-//! Every query's sum runs over the centres in the same order, whether it comes alone or among
-//! thousands.
-//! So the bits are the same.
+//! Queries are the lanes of vectorised loops, and centres are the outer loop. The sum of each query
+//! runs over the centres in the same order, whether it is evaluated alone or among thousands, so
+//! the bits are the same.
 
 use core::ops::Range;
 
@@ -12,24 +11,24 @@ use crate::{
     lanes::{Job, Lane, dispatch},
 };
 
-/// Queries in a full block: long enough for the compiler to vectorise, short enough for the
+/// Number of queries in a full block: enough for the compiler to vectorise, and few enough for the
 /// first-level cache.
 pub(crate) const BLOCK: usize = 64;
 
-/// Queries in the smaller blocks that take the remainder.
+/// Number of queries in the smaller blocks for the remainder.
 pub(crate) const TAIL: usize = 8;
 
 /// The kernel sum of a spline, in its frame.
 #[derive(Clone, Copy)]
 pub(crate) struct KernelSum<'a, K, const D: usize, const M: usize> {
     pub(crate) kernel: &'a K,
-    /// Coordinates of the centres, axis by axis.
+    /// Coordinates of the centres, by axes.
     pub(crate) centres: [&'a [f64]; D],
-    /// Weights of the centres, output by output.
+    /// Weights of the centres, by outputs.
     pub(crate) weights: [&'a [f64]; M],
 }
 
-/// Sums for `W` queries: U, its gradient and its Hessian, as far as the order asked for.
+/// Sums for `W` queries: U, its gradient and its Hessian, up to the requested order.
 pub(crate) struct Lanes<const D: usize, const M: usize, const W: usize> {
     pub(crate) value: [[f64; W]; M],
     pub(crate) gradient: [[[f64; W]; D]; M],
@@ -54,8 +53,8 @@ impl<const D: usize, const M: usize, const W: usize> Lanes<D, M, W> {
         }
     }
 
-    /// Adds a term's value, gradient 2U'd and, at second order, Hessian 2U' I + 4U'' d dᵀ
-    /// (derivatives by s = |d|²).
+    /// Adds the value of a term, its gradient 2U'd and, at second order, its Hessian 2U' I + 4U'' d
+    /// dᵀ (derivatives by s = |d|²).
     #[inline(always)]
     fn add_derivatives<L: Lane, const ORDER: usize>(
         &mut self,
@@ -98,7 +97,7 @@ fn add<L: Lane>(sum: &mut f64, a: L, b: L) {
 }
 
 impl<K: Kernel, const D: usize, const M: usize> KernelSum<'_, K, D, M> {
-    /// Sums up to derivatives of the given `ORDER` (0, 1 or 2) at the queries `x`, axis by axis.
+    /// Sums up to derivatives of the given `ORDER` (0, 1 or 2) at the queries `x`, given by axes.
     #[inline(always)]
     pub(crate) fn block<L: Lane, const W: usize, const ORDER: usize>(
         &self,
@@ -108,7 +107,7 @@ impl<K: Kernel, const D: usize, const M: usize> KernelSum<'_, K, D, M> {
         let n = self.centres[0].len();
         let centres = self.centres.map(|axis| &axis[..n]);
         let weights = self.weights.map(|output| &output[..n]);
-        // The centre's numbers are read once for all queries of the block.
+        // The data of a centre are read once for all queries of the block.
         for j in 0..n {
             let centre: [L; D] = core::array::from_fn(|k| L::from_f64(centres[k][j]));
             let weight: [L; M] = core::array::from_fn(|m| L::from_f64(weights[m][j]));
@@ -129,10 +128,10 @@ impl<K: Kernel, const D: usize, const M: usize> KernelSum<'_, K, D, M> {
 }
 
 impl<K: Kernel, const D: usize, const M: usize> KernelSum<'_, K, D, M> {
-    /// Subtracts the sum at the places of a range, which begins at a multiple of [`BLOCK`], from
-    /// `residuals`.
+    /// Subtracts the kernel sum at the points of a range, which starts at a multiple of [`BLOCK`],
+    /// from `residuals`.
     ///
-    /// `residuals` holds those of all places, output by output.
+    /// `residuals` holds the values of all points, by outputs.
     pub(crate) fn subtract(self, places: [&[f64]; D], range: Range<usize>, residuals: &mut [f64]) {
         dispatch(Subtract {
             sum: self,
@@ -143,12 +142,12 @@ impl<K: Kernel, const D: usize, const M: usize> KernelSum<'_, K, D, M> {
     }
 }
 
-/// Subtracts the kernel sum at the places of a range, which begins at a multiple of [`BLOCK`].
+/// Subtracts the kernel sum at the points of a range, which starts at a multiple of [`BLOCK`].
 struct Subtract<'a, K, const D: usize, const M: usize> {
     sum: KernelSum<'a, K, D, M>,
     places: [&'a [f64]; D],
     range: Range<usize>,
-    /// Of all places, output by output.
+    /// Residuals of all points, by outputs.
     residuals: &'a mut [f64],
 }
 

@@ -1,8 +1,8 @@
 //! Arithmetic of vectorised loops, and their dispatch to the instruction set of the processor.
 //!
-//! The loops are plain Rust over slices of one scalar. Inlined into a function with wider vectors
-//! enabled, the compiler vectorises them. Sums are written out (fused or not), so that the result
-//! depends on that choice alone.
+//! The loops are plain Rust over slices of one scalar type. If they are inlined into a function
+//! with wider vectors enabled, the compiler vectorises them. Sums are written out (fused or not),
+//! so that the result depends only on this choice.
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -11,9 +11,9 @@ use crate::KernelScalar;
 /// Unit roundoff, half the distance from one to the next number.
 pub(crate) const UNIT_ROUNDOFF: f64 = 0.5 * f64::EPSILON;
 
-/// A [`KernelScalar`] that stands for an `f64` in a vectorised loop.
+/// A [`KernelScalar`] that represents an `f64` in a vectorised loop.
 pub(crate) trait Lane: KernelScalar {
-    /// The number.
+    /// The represented number.
     fn get(self) -> f64;
 }
 
@@ -47,7 +47,7 @@ impl KernelScalar for f64 {
     }
 }
 
-/// `f64` whose `mul_add` is one hardware instruction.
+/// `f64` with `mul_add` as one hardware instruction.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 struct Fused(f64);
 
@@ -102,7 +102,7 @@ impl Neg for Fused {
     }
 }
 
-/// Work on lanes. Mark `run` and what it calls `#[inline(always)]`.
+/// Work on lanes. Mark `run` and the functions that it calls `#[inline(always)]`.
 pub(crate) trait Job {
     type Output;
     fn run<L: Lane>(self) -> Self::Output;
@@ -114,7 +114,7 @@ impl<J: Job> pulp::WithSimd for Dispatched<J> {
     type Output = J::Output;
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> J::Output {
-        // Without a fused instruction `mul_add` is a slow call of a library.
+        // Without a fused instruction, `mul_add` is a slow library call.
         if S::IS_SCALAR || cfg!(target_arch = "wasm32") {
             self.0.run::<f64>()
         } else {
@@ -128,7 +128,7 @@ pub(crate) fn dispatch<J: Job>(job: J) -> J::Output {
     pulp::Arch::new().dispatch(Dispatched(job))
 }
 
-/// Inner product in eight partial sums, which the compiler turns into vectors.
+/// Inner product in eight partial sums, which the compiler combines into vectors.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (lanes, others) = (a.chunks_exact(8), b.chunks_exact(8));
@@ -157,7 +157,7 @@ pub(crate) fn relative(size: f64, targets: &[f64]) -> f64 {
     if target > 0.0 { size / target } else { size }
 }
 
-/// The squared distance of point `i`, of coordinates axis by axis, from a place.
+/// The squared distance of point `i` from a position. Coordinates are given by axes.
 #[inline(always)]
 pub(crate) fn squared_distance<L: Lane, const D: usize>(
     axes: [&[f64]; D],
@@ -172,13 +172,12 @@ pub(crate) fn squared_distance<L: Lane, const D: usize>(
     s
 }
 
-/// ln x for positive normal `x`, without branches or tables, so that loops vectorise. Elsewhere
-/// finite nonsense.
+/// ln x for positive normal `x`, without branches or tables, so that loops vectorise. For other
+/// values the result is finite but meaningless.
 ///
-/// x = 2ᵏ m with m in [√½, √2), f = m − 1, t = f/(2 + f) and
-/// ln m = 2 artanh t = f − f²/2 + t (f²/2 + R(t²)).
-/// R is a minimax polynomial (coefficients of fdlibm, Sun Microsystems 1993).
-/// Its error is below 2⁻⁵⁸.
+/// x = 2ᵏ m with m in [√½, √2), f = m − 1, t = f/(2 + f) and ln m = 2 artanh t = f − f²/2 + t
+/// (f²/2 + R(t²)). R is a minimax polynomial (coefficients of fdlibm, Sun Microsystems 1993). Its
+/// error is below 2⁻⁵⁸.
 #[inline(always)]
 fn ln(x: f64, fma: impl Fn(f64, f64, f64) -> f64) -> f64 {
     let root_half: u64 = 0x3fe6_a09e_667f_3bcd;
@@ -188,7 +187,7 @@ fn ln(x: f64, fma: impl Fn(f64, f64, f64) -> f64) -> f64 {
     let ln2_high: f64 = 6.931_471_803_691_238e-1;
     let ln2_low: f64 = 1.908_214_929_270_587_7e-10;
     let shifted = x.to_bits().wrapping_add(one - root_half);
-    // The exponent as the low bits of 2⁵²: a conversion to a float that vectorises on every
+    // The exponent as the low bits of 2⁵²: a conversion to floating point that vectorises on every
     // processor.
     let k = f64::from_bits(two_52 | (shifted >> 52)) - (4_503_599_627_370_496.0 + 1023.0);
     let f = f64::from_bits((shifted & mantissa).wrapping_add(root_half)) - 1.0;
@@ -207,7 +206,7 @@ fn ln(x: f64, fma: impl Fn(f64, f64, f64) -> f64) -> f64 {
         0.666_666_666_666_673_5,
     ) * z;
     let half_square = 0.5 * f * f;
-    // ln 2 is split in two: k times the upper part is exact.
+    // ln 2 is split into two parts, so that k times the upper part is exact.
     let tail = fma(t, half_square + (odd + even), k * ln2_low);
     fma(k, ln2_high, f - (half_square - tail))
 }
@@ -216,7 +215,7 @@ fn ln(x: f64, fma: impl Fn(f64, f64, f64) -> f64) -> f64 {
 mod tests {
     use super::ln;
 
-    /// Arguments over all exponents and close to one, by a fixed multiplicative sequence.
+    /// Arguments over all exponents and close to one, from a fixed multiplicative sequence.
     fn arguments() -> impl Iterator<Item = f64> {
         let wide = (0..200_000u64).map(|i| {
             let bits = i.wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -225,8 +224,8 @@ mod tests {
         wide.chain((0..200_000).map(|i| 0.5 + f64::from(i) * 1e-5))
     }
 
-    /// fdlibm states less than one unit in the last place; the library's own logarithm may be half
-    /// a unit off, and an ulp is up to twice epsilon relative.
+    /// fdlibm states less than one unit in the last place. The library's own logarithm may be off
+    /// by half a unit, and an ulp is up to twice epsilon in relative terms.
     #[test]
     fn logarithm_agrees_with_the_library_to_an_ulp() {
         assert_eq!(ln(1.0, f64::mul_add), 0.0);

@@ -12,11 +12,11 @@
 //! | accept any warp | the object-safe trait [`Warp`]: splines, [`Affine`] |
 //! | fit any kind of warp | the trait [`WarpModel`]: [`FitOptions`], [`AffineModel`] |
 //!
-//! Jacobian: $\nabla f = A + \sum_i w_i U^{\prime}(r_i) (x - x_i)^T/r_i$. Costs for n points: fit
-//! $n^3/3$, new targets $O(n^2)$, a query $O(n)$. Beyond 3000 points a fit takes O(steps × n²) time
-//! and O(n) memory. Lengths are in any unit, errors are [`TpsError`].
+//! Jacobian: $\nabla f = A + \sum_i w_i U^{\prime}(r_i) (x - x_i)^T/r_i$. Costs for n points:
+//! $n^3/3$ for a fit, $O(n^2)$ for new targets, $O(n)$ for a query. Beyond 3000 points a fit takes
+//! O(steps × n²) time and O(n) memory. Lengths are in any unit, and errors are [`TpsError`].
 #![forbid(unsafe_code)]
-// Several arrays share one index in dense linear algebra: zipping them hides it.
+// Several arrays share one index in dense linear algebra, and zipping them hides it.
 #![allow(clippy::needless_range_loop)]
 
 mod affine;

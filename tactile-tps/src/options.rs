@@ -5,7 +5,7 @@ use crate::{
     error::{validate_smoothing, validate_weights},
 };
 
-/// How the equations are solved.
+/// Solution method of the equations.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -28,13 +28,13 @@ use crate::{
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Solver {
-    /// Direct up to 3000 points and for cross-validation, iterative beyond.
+    /// Direct for up to 3000 points and for cross-validation, otherwise iterative.
     #[default]
     Automatic,
-    /// A dense factor: n³/3 operations and 8n² bytes, to rounding.
+    /// A dense factor: n³/3 operations and 8n² bytes, accurate to rounding.
     Direct,
-    /// Preconditioned conjugate gradients: n² kernels a step, O(n) memory, to the
-    /// [tolerance](FitOptions::with_tolerance).
+    /// Preconditioned conjugate gradients: n² kernel evaluations per step, O(n) memory, accurate to
+    /// the [tolerance](FitOptions::with_tolerance).
     Iterative,
 }
 
@@ -66,7 +66,7 @@ pub struct FitOptions<K = R2LogR> {
     pub(crate) tolerance: f64,
 }
 
-/// Options as they are read, before the setters have checked them.
+/// Options as read from a file, before validation by the setters.
 #[cfg(feature = "serde")]
 #[derive(serde::Deserialize)]
 struct Unchecked<K> {
@@ -102,7 +102,7 @@ impl Default for FitOptions<R2LogR> {
 }
 
 impl<K> FitOptions<K> {
-    /// Interpolation with this kernel, all points alike.
+    /// Interpolation with this kernel and equal weights.
     ///
     /// ```
     /// use tactile_tps::{FitOptions, R3};
@@ -144,9 +144,9 @@ impl<K> FitOptions<K> {
         Ok(self)
     }
 
-    /// Gives every point a weight of at least zero. Zero leaves the point out.
+    /// Sets the weight of each point, at least zero. A point of weight zero is ignored.
     ///
-    /// Weights act against λ: an interpolating spline passes through every point of positive
+    /// Weights act relative to λ: an interpolating spline passes through every point of positive
     /// weight.
     ///
     /// ```
@@ -165,17 +165,19 @@ impl<K> FitOptions<K> {
     ///
     /// # Errors
     /// [`TpsError::Weight`] for a weight that is negative, NaN or infinite, [`TpsError::Empty`] if
-    /// none is positive. Whether there are as many weights as points is checked by the fit.
+    /// none is positive. The fit checks that there are as many weights as points.
     pub fn with_weights(mut self, weights: Vec<f64>) -> Result<Self, TpsError> {
         validate_weights(&weights, weights.len())?;
         self.weights = Some(weights);
         Ok(self)
     }
 
-    /// Drops directions in which the points extend less than this fraction of their largest extent.
+    /// Drops directions in which the extent of the points is less than this fraction of their
+    /// largest extent.
     ///
-    /// The default 0 drops those that rounding of the coordinates alone could have made. A nearly
-    /// flat surface needs more: across it the spline's gradient is noise divided by thickness.
+    /// The default 0 drops only directions that could come from rounding of the coordinates. A
+    /// nearly flat surface needs a larger value: normal to it, the gradient of the spline is noise
+    /// divided by thickness.
     ///
     /// ```
     /// use nalgebra::Point3;
@@ -203,7 +205,7 @@ impl<K> FitOptions<K> {
         Ok(self)
     }
 
-    /// Sets how the equations are solved.
+    /// Sets the solution method of the equations.
     ///
     /// ```
     /// use tactile_tps::{FitOptions, Solver};
@@ -219,8 +221,8 @@ impl<K> FitOptions<K> {
     /// Sets the residual at which an iterative solver stops: the largest at a point, relative to
     /// the largest target.
     ///
-    /// The default is 10⁻¹⁰. The spline's values are off by about as much. Its report has the
-    /// residual that was reached.
+    /// The default is 10⁻¹⁰, which is also the approximate error of the spline's values. The report
+    /// contains the residual that was reached.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -252,7 +254,7 @@ impl<K> FitOptions<K> {
     pub(crate) fn iterates(&self, points: usize) -> bool {
         match self.solver {
             _ if self.smoothing == Smoothing::Gcv => false,
-            // From here on iteration is faster than the factor.
+            // Above this number iteration is faster than the factor.
             Solver::Automatic => points > 3000,
             Solver::Direct => false,
             Solver::Iterative => true,
@@ -260,13 +262,13 @@ impl<K> FitOptions<K> {
     }
 }
 
-/// How a spline was fitted and how far it can be trusted.
+/// Report of a fit, with its accuracy.
 ///
 /// ```
 /// use nalgebra::Point2;
 /// use tactile_tps::{FitOptions, ThinPlateSpline};
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
-/// // Three points on a line: nothing is known across it.
+/// // Three points on a line determine nothing normal to it.
 /// let sources = [[0.0, 0.0], [1.0, 1.0], [3.0, 3.0], [3.0, 3.0]].map(Point2::from);
 /// let warp = ThinPlateSpline::fit(&sources, &sources, &FitOptions::default())?;
 /// let report = warp.report;
@@ -279,46 +281,44 @@ impl<K> FitOptions<K> {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct FitReport {
-    /// Points given.
+    /// Number of points given.
     pub points: usize,
-    /// Points merged into an earlier one at the same place.
+    /// Number of points merged with an earlier one at the same position.
     pub merged: usize,
-    /// Points left out because their weight is zero.
+    /// Number of points ignored because their weight is zero.
     pub ignored: usize,
-    /// Rank of [1 X]: one more than the number of directions the points span. D + 1 when they span
-    /// space.
+    /// Rank of [1 X]: one more than the number of directions that the points span. D + 1 if they
+    /// span space.
     pub rank: usize,
-    /// Root mean square extent of the points along their principal directions relative to the
-    /// largest, falling.
+    /// Root mean square extent of the points along their principal directions, relative to the
+    /// largest, in descending order.
     ///
-    /// With a tiny last entry the gradient along that direction is noise over thickness.
+    /// If the last entry is tiny, the gradient along that direction is noise over thickness.
     pub extents: Vec<f64>,
     /// The smoothing parameter λ used, in the units of the points and the kernel. 0 for
     /// interpolation.
     pub lambda: f64,
-    /// Estimated 2-norm condition number of the matrix solved with, in the inner units. 1 for the
+    /// Estimated 2-norm condition number of the solved matrix, in internal units. 1 for the
     /// iterative solver.
     ///
-    /// Beyond 10¹⁰ some points nearly coincide. Values keep their digits there, single weights do
-    /// not.
-    /// Infinite where rounding left the matrix indefinite and λ was raised to the size of that
-    /// rounding.
+    /// Above 10¹⁰ some points nearly coincide. Values keep their digits then, single weights do
+    /// not. Infinite if rounding made the matrix indefinite, so that λ was raised to the size of
+    /// this rounding.
     pub condition: f64,
-    /// Largest residual of the spline's equations relative to the largest target.
+    /// Largest residual of the spline's equations, relative to the largest target.
     ///
-    /// It is measured at up to 64 points spread evenly. Where the solution was refined, at all
-    /// before the last step.
-    /// `None` after a quick refit, which does not spend the time.
+    /// It is measured at up to 64 evenly distributed points. If the solution was refined, it is
+    /// measured at all points before the last step. `None` after a quick refit, which skips it.
     pub residual: Option<f64>,
-    /// Steps of iterative refinement taken.
+    /// Number of iterative refinement steps.
     pub refinements: usize,
-    /// Steps of conjugate gradients of the iterative solver. Zero for a direct solve.
+    /// Number of conjugate-gradient steps of the iterative solver. Zero for a direct solve.
     pub iterations: usize,
-    /// Why the solver ended: [`StopReason::Direct`] for a direct solve.
+    /// Why the solver stopped: [`StopReason::Direct`] for a direct solve.
     pub stop: StopReason,
-    /// Decimal digits of the sum of the spline's terms near the points.
+    /// Number of accurate decimal digits of the sum of the spline's terms near the points.
     ///
-    /// That is −log₁₀ of its rounding error relative to the targets' size.
+    /// It is −log₁₀ of the rounding error relative to the size of the targets.
     pub digits: f64,
 }
 

@@ -1,6 +1,6 @@
-//! How closely a spline follows its targets.
+//! Trade-off between smoothness and fidelity of a spline.
 
-/// How closely the spline follows its targets.
+/// Trade-off between smoothness and fidelity of a spline.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -23,24 +23,24 @@
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Smoothing {
-    /// Interpolate: λ = 0.
+    /// Interpolation: λ = 0.
     #[default]
     None,
-    /// Minimise Σ weightᵢ |f(xᵢ) − yᵢ|² + λ wᵀKw for this λ ≥ 0, in the units of the points and the
-    /// kernel.
+    /// Minimises Σ weightᵢ |f(xᵢ) − yᵢ|² + λ wᵀKw for this λ ≥ 0, in the units of the points and
+    /// the kernel.
     Lambda(f64),
-    /// The λ of least generalised cross-validation (Craven & Wahba 1979; Golub, Heath & Wahba
-    /// 1979).
+    /// Chooses the λ that minimises the generalised cross-validation score (Craven & Wahba 1979;
+    /// Golub, Heath & Wahba 1979).
     Gcv,
 }
 
-/// The λ of least generalised cross-validation, from the spectrum of the matrix with σ on `affine`
-/// directions.
+/// The λ that minimises the generalised cross-validation score, from the spectrum of the matrix
+/// with σ on `affine` directions.
 ///
-/// V(λ) = n |W^½(y − f)|² / tr(I − H)², both sums over the eigenvalues μ: |W^½(y − f)|² = Σ (λ/(μ +
-/// λ))² e and tr(I − H) = Σ λ/(μ + λ) less the terms of the affine directions.
-/// `energies` are the squared coefficients e = (vᵀb)² of the values in the eigenvectors, summed
-/// over the outputs.
+/// V(λ) = n |W^½(y − f)|² / tr(I − H)². Both are sums over the eigenvalues μ: |W^½(y − f)|² = Σ
+/// (λ/(μ + λ))² e, and tr(I − H) = Σ λ/(μ + λ) minus the terms of the affine directions. `energies`
+/// are the squared coefficients e = (vᵀb)² of the values in the eigenvectors, summed over the
+/// outputs.
 pub(crate) fn least_gcv(values: &[f64], energies: &[f64], affine: usize, shift: f64) -> f64 {
     let most = values.iter().fold(f64::MIN_POSITIVE, |m, &mu| m.max(mu));
     let score = |log: f64| {
@@ -48,20 +48,19 @@ pub(crate) fn least_gcv(values: &[f64], energies: &[f64], affine: usize, shift: 
         let pairs = values.iter().zip(energies);
         let rss: f64 = pairs.map(|(&mu, e)| filter(mu).powi(2) * e).sum();
         let all: f64 = values.iter().map(|&mu| filter(mu)).sum();
-        // The affine directions have the eigenvalue σ, which is no part of the fit.
+        // The affine directions have the eigenvalue σ, which does not belong to the fit.
         let trace = all - affine as f64 * filter(shift);
         values.len() as f64 * rss / (trace * trace)
     };
-    // From far below what rounding of the matrix allows to where the spline is affine to single
-    // precision.
+    // From far below the rounding of the matrix to a spline that is affine to single precision.
     minimise(most.log2() - 50.0, most.log2() + 24.0, score).exp2()
 }
 
-/// The least of a function on a grid, then by golden section around it. The larger argument where
-/// values are equal.
+/// The minimum of a function on a grid, refined by golden sections. The larger argument is returned
+/// if values are equal.
 fn minimise(low: f64, high: f64, f: impl Fn(f64) -> f64) -> f64 {
-    // Half a power of two a step: the score can have several minima, which the golden section would
-    // miss.
+    // Steps of half a power of two: the score can have several minima, which the golden section
+    // would miss.
     let steps = 148;
     let at = |i: usize| low + (high - low) * i as f64 / steps as f64;
     let scores = (0..=steps).map(|i| (f(at(i)), i));

@@ -2,13 +2,14 @@
 
 use crate::lanes::dot;
 
-/// Affine functions in three dimensions: 1, x, y and z.
+/// Number of affine functions in three dimensions: 1, x, y and z.
 pub(crate) const MAX: usize = 4;
 
 /// Coefficients of an affine function.
 pub(crate) type Coefficients = [f64; MAX];
 
-/// Sweeps of rotations at most. Three columns need a handful: convergence is quadratic.
+/// Maximum number of sweeps of rotations. Three columns need a few, because convergence is
+/// quadratic.
 const SWEEPS: usize = 20;
 
 /// The directions in which points extend, from the singular values of their centred coordinates.
@@ -18,7 +19,7 @@ pub(crate) struct Span<const D: usize> {
     pub(crate) directions: usize,
     /// Orthonormal directions, spanned ones first. The coordinate axes if all are spanned.
     pub(crate) basis: [[f64; D]; D],
-    /// Root mean square extent along each direction relative to the largest, falling.
+    /// Root mean square extent along each direction, relative to the largest, in descending order.
     pub(crate) extents: [f64; D],
 }
 
@@ -33,14 +34,13 @@ impl<const D: usize> Default for Span<D> {
 }
 
 impl<const D: usize> Span<D> {
-    /// The span of n points, whose coordinates stand in `columns`, axis by axis, and are
-    /// overwritten.
+    /// The span of n points. Their coordinates are in `columns`, by axes, which are overwritten.
     ///
-    /// A direction counts if its extent exceeds the rounding `grain` and the share `tolerance` of
-    /// the largest.
+    /// A direction counts if its extent exceeds the rounding error `grain` and the fraction
+    /// `tolerance` of the largest extent.
     pub(crate) fn new(columns: &mut [f64], grain: f64, tolerance: f64) -> Self {
         let n = columns.len() / D;
-        // Centred, so that an offset of all points is no extent.
+        // Centred, so that a common offset does not count as extent.
         for column in columns.chunks_exact_mut(n) {
             let mean = column.iter().sum::<f64>() / n as f64;
             column.iter_mut().for_each(|x| *x -= mean);
@@ -57,7 +57,7 @@ impl<const D: usize> Span<D> {
         let directions = sizes.iter().filter(|size| **size > noise).count();
         Self {
             directions,
-            // The coordinate axes where all directions are spanned: the coefficients then are the
+            // The coordinate axes if all directions are spanned: the coefficients then are the
             // gradient.
             basis: if directions < D {
                 order.map(|k| vectors[k])
@@ -88,7 +88,7 @@ impl<const D: usize> Span<D> {
             .sum()
     }
 
-    /// The identity across the spanned directions: N = Σ b bᵀ over the others.
+    /// The identity on the directions that are not spanned: N = Σ b bᵀ over them.
     pub(crate) fn across(&self) -> [[f64; D]; D] {
         let entry = |i: usize, k: usize| {
             let others = &self.basis[self.directions..];
@@ -97,22 +97,24 @@ impl<const D: usize> Span<D> {
         core::array::from_fn(|i| core::array::from_fn(|k| entry(i, k)))
     }
 
-    /// The gradient in coordinates of an affine function.
+    /// The gradient of an affine function in coordinates.
     pub(crate) fn gradient(&self, a: &Coefficients) -> [f64; D] {
         core::array::from_fn(|k| (1..=self.directions).map(|c| a[c] * self.slope(c, k)).sum())
     }
 }
 
-/// Size of a column of n coordinates that rounding alone, `grain` each, could have made.
+/// Size of a column of n coordinates that could come from rounding errors `grain` alone.
 pub(crate) fn rounding(n: usize, grain: f64) -> f64 {
-    // Rounding of n coordinates adds up to √n of that of one. 8: several such sums.
+    // Rounding errors of n coordinates add up to √n times that of one. The factor 8 covers several
+    // such sums.
     8.0 * (grain + f64::EPSILON) * (n as f64).sqrt()
 }
 
-/// Turns the `D` columns until they are orthogonal, and returns the directions along which they
-/// then stand: the right singular vectors, in no order.
+/// Rotates the `D` columns until they are orthogonal. Returns the directions along which they then
+/// point: the right singular vectors, in any order.
 ///
-/// One-sided rotations (Hestenes 1958) keep small singular values to their own relative precision.
+/// One-sided rotations (Hestenes 1958) compute small singular values to their own relative
+/// precision.
 pub(crate) fn principal_axes<const D: usize>(columns: &mut [f64]) -> [[f64; D]; D] {
     let n = columns.len() / D;
     let mut vectors = core::array::from_fn(|j| core::array::from_fn(|i| f64::from(i == j)));
@@ -131,7 +133,7 @@ pub(crate) fn principal_axes<const D: usize>(columns: &mut [f64]) -> [[f64; D]; 
 }
 
 /// Rotates columns `p` and `q` of length `n` until they are orthogonal, and `vectors` with them.
-/// `false` if they are.
+/// Returns `false` if they already are.
 fn orthogonalise<const D: usize>(
     columns: &mut [f64],
     n: usize,
@@ -142,12 +144,12 @@ fn orthogonalise<const D: usize>(
     let (left, right) = columns.split_at_mut(q * n);
     let (left, right) = (&mut left[p * n..(p + 1) * n], &mut right[..n]);
     let (a, b, c) = (dot(left, left), dot(right, right), dot(left, right));
-    // Rounding of the sums: below it the columns are orthogonal.
+    // Rounding error of the sums. If the product is below it, the columns are orthogonal.
     if c.abs() <= f64::EPSILON * (n as f64).sqrt() * (a * b).sqrt() {
         return false;
     }
     let zeta = (b - a) / (2.0 * c);
-    // The smaller of the two angles, by the form that does not cancel.
+    // The smaller of the two angles, in a form without cancellation.
     let tangent = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
     let cosine = 1.0 / (1.0 + tangent * tangent).sqrt();
     let sine = cosine * tangent;
@@ -167,8 +169,8 @@ fn orthogonalise<const D: usize>(
 mod tests {
     use super::*;
 
-    /// Columns of known lengths turned by a known rotation: sizes to rounding, a small one to its
-    /// own precision.
+    /// Columns of known lengths are rotated by a known rotation. Their sizes must be recovered to
+    /// rounding, and a small one to its own precision.
     #[test]
     fn extents_come_to_their_own_precision() {
         let (c, s) = (0.8, 0.6);
@@ -183,7 +185,7 @@ mod tests {
             0.0,
             1.0,
         ];
-        // Each point and its mirror image, so that the mean is zero.
+        // Each point with its mirror image, so that the mean is zero.
         let mut both: Vec<f64> = columns
             .chunks_exact(3)
             .flat_map(|column| column.iter().copied().chain(column.iter().map(|x| -x)))

@@ -1,4 +1,4 @@
-//! Maps of space onto itself, and models that find one from pairs of points.
+//! Maps of space onto itself, and models that fit them to pairs of points.
 
 use core::any::Any;
 use core::ops::Deref;
@@ -7,7 +7,8 @@ use nalgebra::{Point, SMatrix};
 
 use crate::{FitOptions, Kernel, Spline, ThinPlateSpline, TpsError, error::same_length};
 
-/// A map of `D`-dimensional space onto itself. Object safe: a `Box<dyn Warp<3>>` is a warp.
+/// A map of `D`-dimensional space onto itself. The trait is object safe, and `Box<dyn Warp<3>>`
+/// implements it.
 ///
 /// ```
 /// use nalgebra::{Point2, Matrix2, Vector2};
@@ -20,15 +21,15 @@ pub trait Warp<const D: usize>: Send + Sync {
     /// The image of a point.
     fn apply(&self, point: &Point<f64, D>) -> Point<f64, D>;
 
-    /// The Jacobian ∂fᵢ/∂xⱼ at a point (row i, column j). For a deformation this is the
-    /// deformation gradient.
+    /// The Jacobian ∂fᵢ/∂xⱼ at a point (row i, column j). For a deformation it is the deformation
+    /// gradient.
     fn jacobian(&self, point: &Point<f64, D>) -> SMatrix<f64, D, D>;
 
-    /// Rank of [1 X] of the points that the warp was fitted to: one more than the number of
-    /// directions they span. `D + 1` if they span space, which is the default.
+    /// Rank of the matrix [1 X] of the points used for the fit: one more than the number of
+    /// directions that they span. The default is `D + 1`, for points that span space.
     ///
-    /// Along other directions the points determine nothing. The crate's warps move the whole line
-    /// (or plane) across the points with its foot and leave lengths across as they are.
+    /// Along other directions the points determine nothing. There the crate's warps move each
+    /// normal line (or plane) with its foot point, without a change of length.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -44,7 +45,7 @@ pub trait Warp<const D: usize>: Send + Sync {
         D + 1
     }
 
-    /// The images of many points, into the caller's memory.
+    /// Writes the images of many points into the caller's memory.
     ///
     /// # Errors
     /// [`TpsError::Length`] if the slices differ in length.
@@ -61,7 +62,7 @@ pub trait Warp<const D: usize>: Send + Sync {
         Ok(())
     }
 
-    /// The Jacobians at many points, into the caller's memory.
+    /// Writes the Jacobians at many points into the caller's memory.
     ///
     /// ```
     /// use nalgebra::{Matrix2, Point2, Vector2};
@@ -94,7 +95,7 @@ pub trait Warp<const D: usize>: Send + Sync {
     }
 }
 
-/// Boxed, shared and borrowed warps.
+/// Implements the trait for boxed, shared and borrowed warps.
 impl<const D: usize, P: Deref<Target: Warp<D>> + Send + Sync> Warp<D> for P {
     fn apply(&self, point: &Point<f64, D>) -> Point<f64, D> {
         (**self).apply(point)
@@ -125,11 +126,11 @@ impl<const D: usize, P: Deref<Target: Warp<D>> + Send + Sync> Warp<D> for P {
     }
 }
 
-/// A family of warps with a rule to choose one from weighted pairs of points.
+/// A family of warps, with a rule that selects one from weighted pairs of points.
 ///
-/// Object safe: a pipeline holds an `Arc<dyn WarpModel<3> + Send + Sync>`.
-/// Where the kind of warp is fixed, fit it by its own type:
-/// [`Spline::fit`], [`Affine::fit`](crate::Affine::fit), [`Affine::fit_rigid`](crate::Affine::fit_rigid).
+/// The trait is object safe, so that a pipeline can hold an `Arc<dyn WarpModel<3> + Send + Sync>`.
+/// If the kind of warp is fixed, use the fit of its own type: [`Spline::fit`],
+/// [`Affine::fit`](crate::Affine::fit), [`Affine::fit_rigid`](crate::Affine::fit_rigid).
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -150,8 +151,8 @@ impl<const D: usize, P: Deref<Target: Warp<D>> + Send + Sync> Warp<D> for P {
 /// # }
 /// ```
 pub trait WarpModel<const D: usize>: Send + Sync {
-    /// The warp that takes each source to its target as nearly as the model allows. Without weights
-    /// all count alike.
+    /// The warp that maps each source to its target as closely as the model permits. Without
+    /// weights all pairs count equally.
     ///
     /// # Errors
     /// See [`TpsError`].
@@ -165,9 +166,8 @@ pub trait WarpModel<const D: usize>: Send + Sync {
     /// The Jacobians at `points` of the warp that [`fit`](Self::fit) finds, for one set of pairs of
     /// a series.
     ///
-    /// A model may work in what it keeps in `memory`, and then allocates nothing from the second
-    /// set on.
-    /// By default the warp is fitted as if alone.
+    /// A model may keep its state in `memory`; it then allocates nothing from the second set on.
+    /// The default implementation calls `fit`.
     ///
     /// ```
     /// use nalgebra::{Matrix2, Point2};
@@ -185,8 +185,8 @@ pub trait WarpModel<const D: usize>: Send + Sync {
     /// ```
     ///
     /// # Errors
-    /// Those of [`fit`](Self::fit), and [`TpsError::Length`] where `points` and `jacobians` differ
-    /// in number.
+    /// Those of [`fit`](Self::fit), and [`TpsError::Length`] if `points` and `jacobians` differ in
+    /// number.
     fn jacobians_through(
         &self,
         memory: &mut SeriesMemory,
@@ -200,7 +200,7 @@ pub trait WarpModel<const D: usize>: Send + Sync {
     }
 }
 
-/// Boxed, shared and borrowed models.
+/// Implements the trait for boxed, shared and borrowed models.
 impl<const D: usize, P: Deref<Target: WarpModel<D>> + Send + Sync> WarpModel<D> for P {
     fn fit(
         &self,
@@ -222,7 +222,7 @@ impl<const D: usize, P: Deref<Target: WarpModel<D>> + Send + Sync> WarpModel<D> 
     }
 }
 
-/// Pairs of points, as many sources as targets and, where given, weights.
+/// Pairs of points: equal numbers of sources and targets and, optionally, weights.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -233,11 +233,11 @@ impl<const D: usize, P: Deref<Target: WarpModel<D>> + Send + Sync> WarpModel<D> 
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Pairs<'a, const D: usize> {
-    /// From where.
+    /// Source points.
     pub sources: &'a [Point<f64, D>],
-    /// To where.
+    /// Target points.
     pub targets: &'a [Point<f64, D>],
-    /// How much each pair counts. Without weights all count alike.
+    /// Weight of each pair. `None` for equal weights.
     pub weights: Option<&'a [f64]>,
 }
 
@@ -268,7 +268,7 @@ impl<const D: usize, K: Kernel> Warp<D> for Spline<D, D, K> {
 }
 
 impl<const D: usize, K: Kernel + 'static> WarpModel<D> for FitOptions<K> {
-    /// `weights`, where given, replace those of the options.
+    /// If `weights` are given, they replace those of the options.
     fn fit(
         &self,
         sources: &[Point<f64, D>],
@@ -286,10 +286,10 @@ impl<const D: usize, K: Kernel + 'static> WarpModel<D> for FitOptions<K> {
     }
 }
 
-/// Memory of one method along a series, for [`WarpModel::jacobians_through`] and others like it.
+/// State of one method along a series, for [`WarpModel::jacobians_through`] and similar methods.
 ///
-/// Its content belongs to the method, which asks for its own type with [`state`](Self::state).
-/// A method that finds the state of another one starts anew.
+/// The content belongs to the method, which gets a value of its own type from
+/// [`state`](Self::state). A method that finds the state of another one starts anew.
 ///
 /// ```
 /// use tactile_tps::SeriesMemory;
@@ -305,7 +305,7 @@ pub struct SeriesMemory {
 }
 
 impl SeriesMemory {
-    /// The state of type `S` that was left here. A default one where there is none, or one of
+    /// The state of type `S` that was left here. Returns the default if there is none, or if it has
     /// another type.
     pub fn state<S: Default + Send + Sync + 'static>(&mut self) -> &mut S {
         let kept = self.state.take().and_then(|state| state.downcast().ok());

@@ -11,17 +11,16 @@ pub(super) struct AffineBasis {
     pub(super) n: usize,
     /// Number of affine functions.
     pub(super) q: usize,
-    /// Q, column by column, and columns of zeros: four in all, so that loops over them have a fixed
-    /// length.
+    /// Q by columns, padded with zero columns to four, so that loops over them have a fixed length.
     pub(super) columns: Vec<f64>,
     pub(super) r: [[f64; MAX]; MAX],
 }
 
 impl AffineBasis {
-    /// Factors the q columns of length n that `fill` writes, by Gram and Schmidt's rule.
+    /// Orthonormalises the q columns of length n that `fill` writes, by Gram–Schmidt.
     ///
-    /// Twice is enough for orthogonality to rounding. Rows keep their own relative precision, which
-    /// wild weights need.
+    /// Two passes give orthogonality to rounding. Rows keep their own relative precision, which
+    /// very different weights require.
     pub(super) fn factor(&mut self, n: usize, q: usize, fill: impl Fn(usize, &mut [f64])) {
         (self.n, self.q) = (n, q);
         self.columns.clear();
@@ -33,8 +32,8 @@ impl AffineBasis {
             fill(k, column);
             for _ in 0..2 {
                 for (i, earlier) in done.chunks_exact(n).enumerate() {
-                    // Modified Gram–Schmidt: each share is taken from what is left, not from the
-                    // original column.
+                    // Modified Gram–Schmidt: each projection is taken from the remainder, not from
+                    // the original column.
                     let share = dot(earlier, column);
                     self.r[i][k] += share;
                     subtract(share, earlier, column);

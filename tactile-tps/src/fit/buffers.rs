@@ -1,11 +1,11 @@
-//! Memory of a solve.
+//! Working memory of a solve.
 
-/// Memory of a solve.
+/// Working memory of a solve.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Buffers {
-    /// Targets at the centres, output by output.
+    /// Targets at the centres, by outputs.
     pub(super) targets: Vec<f64>,
-    /// Weights at the centres, output by output: the answer.
+    /// Weights at the centres, by outputs: the solution.
     pub(super) weights: Vec<f64>,
     pub(super) residuals: Vec<f64>,
     pub(super) work: Vec<f64>,
@@ -13,7 +13,7 @@ pub(super) struct Buffers {
     pub(super) vectors: Vectors,
 }
 
-/// Memory of an iterative solve.
+/// Working memory of an iterative solve.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Vectors {
     pub(super) residual: Vec<f64>,
@@ -22,6 +22,6 @@ pub(super) struct Vectors {
     pub(super) product: Vec<f64>,
     pub(super) solution: Vec<f64>,
     pub(super) target: Vec<f64>,
-    /// Values at the coarse points, and memory of their solve.
+    /// Values at the coarse points, and working memory of their solve.
     pub(super) coarse: [Vec<f64>; 2],
 }

@@ -5,20 +5,20 @@ use nalgebra::Point;
 use super::buffers::Buffers;
 use crate::{TpsError, error::finite, frame::Frame};
 
-/// Distinct points in their frame, and which input point went where.
+/// Distinct points in their frame, and the centre of each input point.
 #[derive(Clone, Debug)]
 pub(super) struct Centres<const D: usize> {
     pub(super) frame: Frame<D>,
-    /// Coordinates in the frame, axis by axis.
+    /// Coordinates in the frame, by axes.
     pub(super) axes: [Vec<f64>; D],
-    /// First input point of every centre, ascending.
+    /// First input point of each centre, ascending.
     pub(super) first: Vec<usize>,
-    /// Centre of every input point. Empty if they are the same.
+    /// Centre of each input point. Empty if all points are distinct.
     pub(super) centre_of: Vec<usize>,
-    /// Rounding of the coordinates, relative to the frame.
+    /// Rounding error of the coordinates, relative to the frame.
     pub(super) grain: f64,
     pub(super) inputs: usize,
-    /// The input points in the order of their coordinates.
+    /// The input points sorted by their coordinates.
     pub(super) order: Vec<usize>,
 }
 
@@ -37,13 +37,13 @@ impl<const D: usize> Default for Centres<D> {
 }
 
 impl<const D: usize> Centres<D> {
-    /// Takes over points, reusing memory where it suffices.
+    /// Stores points, reusing memory if possible.
     pub(super) fn take(&mut self, points: &[Point<f64, D>], rescale: bool) -> Result<(), TpsError> {
         if points.is_empty() {
             return Err(TpsError::Empty("source points"));
         }
         finite(points, "source points")?;
-        // The frame first: grain and coordinates are relative to it.
+        // The frame comes first, because grain and coordinates are relative to it.
         self.frame = Frame::around(points, rescale);
         self.merge(points);
         for (k, axis) in self.axes.iter_mut().enumerate() {
@@ -55,7 +55,7 @@ impl<const D: usize> Centres<D> {
         Ok(())
     }
 
-    /// Finds the first point of every group of equal ones, and the group of each point.
+    /// Finds the first point of each group of equal points, and the group of each point.
     pub(super) fn merge(&mut self, points: &[Point<f64, D>]) {
         let Self {
             first,
@@ -72,12 +72,12 @@ impl<const D: usize> Centres<D> {
             let differ = (0..D).map(|k| points[i][k].partial_cmp(&points[j][k]));
             differ.flatten().find(|o| o.is_ne()).unwrap_or(i.cmp(&j))
         };
-        // Sorted by coordinates, equal points stand next to each other, the first one first.
+        // After sorting by coordinates, equal points are adjacent, with the first one in front.
         order.sort_unstable_by(compare);
         if order.windows(2).all(|w| points[w[0]] != points[w[1]]) {
             return;
         }
-        // The first point of every point's group, then the group's number.
+        // First the index of each group's first point, then the number of the group.
         centre_of.extend(0..points.len());
         for pair in order.windows(2) {
             if points[pair[0]] == points[pair[1]] {
@@ -90,7 +90,7 @@ impl<const D: usize> Centres<D> {
         }
     }
 
-    /// Replaces `local` by these centres alone, in the same frame.
+    /// Replaces `local` by only these centres, in the same frame.
     pub(super) fn select(&self, centres: impl Iterator<Item = usize> + Clone, local: &mut Self) {
         for (axis, all) in local.axes.iter_mut().zip(&self.axes) {
             axis.clear();
@@ -110,7 +110,7 @@ impl<const D: usize> Centres<D> {
         self.centre_of.get(i).copied().unwrap_or(i)
     }
 
-    /// Coinciding points must have equal targets where the spline interpolates.
+    /// Checks that coincident points have equal targets if the spline interpolates.
     pub(super) fn agree<const M: usize>(
         &self,
         targets: &[Point<f64, M>],
@@ -120,7 +120,7 @@ impl<const D: usize> Centres<D> {
         for second in (0..self.centre_of.len()).filter(|&i| counts(i)) {
             let centre = self.centre_of[second];
             let same = |&i: &usize| self.centre_of[i] == centre && counts(i);
-            // Points of weight 0 are passed over. They may disagree with the others.
+            // Points of weight 0 are skipped. They may disagree with the others.
             let first = (self.first[centre]..second).find(same).unwrap_or(second);
             if targets[first] != targets[second] {
                 return Err(TpsError::Conflict { first, second });
@@ -129,8 +129,8 @@ impl<const D: usize> Centres<D> {
         Ok(())
     }
 
-    /// Targets at the centres less `origin`, output by output: the weighted mean where points
-    /// coincide.
+    /// Targets at the centres minus `origin`, by outputs. For coincident points it is the weighted
+    /// mean.
     pub(super) fn gather<const M: usize>(
         &self,
         targets: &[Point<f64, M>],
@@ -149,7 +149,7 @@ impl<const D: usize> Centres<D> {
                 let (centre, weight) = (self.centre(i), weights.map_or(1.0, |w| w[i]));
                 let value = target[k] - origin[k];
                 totals[centre] += weight;
-                // Only points of weight 0 came before, whose targets do not count.
+                // All preceding points have weight 0, so their targets are ignored.
                 if totals[centre] == weight {
                     column[centre] = value;
                 } else if weight > 0.0 {
@@ -159,7 +159,7 @@ impl<const D: usize> Centres<D> {
         }
     }
 
-    /// Weight of every centre, none if all are one.
+    /// Weight of each centre. Empty if all are one.
     pub(super) fn weigh(&self, weights: Option<&[f64]>, sums: &mut Vec<f64>) {
         sums.clear();
         if weights.is_none() && self.centre_of.is_empty() {

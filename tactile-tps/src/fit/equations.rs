@@ -8,19 +8,20 @@ use crate::{
     span::Coefficients,
 };
 
-/// A spline's equations: everything but the targets.
+/// The equations of a spline without the targets.
 pub(super) struct Equations<'a, K, const D: usize> {
     pub(super) kernel: &'a K,
     pub(super) centres: &'a Centres<D>,
     pub(super) system: &'a System<D>,
-    /// λ in the frame's units.
+    /// λ in the units of the frame.
     pub(super) lambda: f64,
 }
 
 impl<K: Kernel, const D: usize> Equations<'_, K, D> {
-    /// Solves for the targets in `buffers`, and refines where the condition number is large.
+    /// Solves for the targets in `buffers`, and refines the solution if the condition number is
+    /// large.
     ///
-    /// `careful` measures the residual and refines from a lower condition number on.
+    /// If `careful`, measures the residual and refines from a lower condition number on.
     pub(super) fn solve<const M: usize>(
         &self,
         buffers: &mut Buffers,
@@ -41,7 +42,7 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
         (report.residual, report.refinements) = (None, 0);
         (report.iterations, report.stop) = (0, StopReason::Direct);
         let n = self.centres.len();
-        // For a few points a step of refinement costs next to nothing, and is taken sooner.
+        // For a few points a refinement step is cheap, so the threshold is lower.
         let threshold = match careful {
             true if n <= 128 => 10.0 * n as f64,
             true => 1e6,
@@ -56,7 +57,7 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
         affine
     }
 
-    /// Iterative refinement, in at most four steps.
+    /// Iterative refinement with at most four steps.
     fn refine<const M: usize>(
         &self,
         buffers: &mut Buffers,
@@ -75,7 +76,7 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
             } = &mut *buffers;
             let more: [Coefficients; M] = self.system.solve(residuals, self.lambda, work, spare);
             let step = largest(residuals) / largest(weights).max(f64::MIN_POSITIVE);
-            // A step that is no shorter than half the one before is rounding.
+            // A step that is not shorter than half the previous one is rounding.
             if step.is_nan() || step > 0.5 * last {
                 return;
             }
@@ -91,8 +92,8 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
         }
     }
 
-    /// y − K w − λ W⁻¹ w − P a at the centres. Gives its largest entry relative to the largest
-    /// target.
+    /// Computes y − K w − λ W⁻¹ w − P a at the centres. Returns its largest entry relative to the
+    /// largest target.
     fn residual<const M: usize>(&self, affine: &[Coefficients; M], buffers: &mut Buffers) -> f64 {
         let n = self.centres.len();
         let Buffers {
@@ -116,7 +117,7 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
         relative(size, targets)
     }
 
-    /// The largest residual at up to one block of centres, spread evenly.
+    /// The largest residual at up to one block of evenly distributed centres.
     fn sampled_residual<const M: usize>(
         &self,
         affine: &[Coefficients; M],
@@ -124,7 +125,7 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
     ) -> f64 {
         let (n, active) = (self.centres.len(), &self.system.active);
         let count = active.len().min(BLOCK);
-        // All residuals would cost O(n²), as much as the solve. One block of them costs O(n).
+        // All residuals would cost O(n²), as much as the solve. One block costs O(n).
         let pick = |i: usize| i * active.len() / count;
         let Buffers {
             targets,

@@ -1,4 +1,4 @@
-//! Source points, factored once for any targets: fits, refits and influences.
+//! Source points factored once for any targets: fits, refits and influences.
 
 use core::ops::ControlFlow;
 
@@ -19,7 +19,7 @@ use crate::{
 };
 
 impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
-    /// Fits the spline that takes `sources` to `targets`.
+    /// Fits the spline that maps `sources` to `targets`.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -34,8 +34,8 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
     /// # }
     /// ```
     ///
-    /// # Errors
-    /// [`TpsError`] for invalid input, coinciding points with different targets, or a kernel that
+    /// [`TpsError`] for invalid input, coincident points with different targets, or a kernel that
+    /// is not positive definite.
     /// is not definite.
     pub fn fit(
         sources: &[Point<f64, D>],
@@ -45,12 +45,11 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
         Factorization::new(sources, options)?.fit(targets)
     }
 
-    /// As [`fit`](Self::fit), reporting the progress of an iterative solver to `watch`, which may
-    /// stop it.
+    /// Like [`fit`](Self::fit), but reports the progress of an iterative solver to `watch`, which
+    /// may stop it.
     ///
-    /// A direct solver does not report. Stopped while it iterates, the fit returns the best spline
-    /// so far.
-    /// Its report has the residual.
+    /// A direct solver does not report. If stopped during the iteration, the fit returns the best
+    /// spline so far, with its residual in the report.
     ///
     /// ```
     /// use core::ops::ControlFlow;
@@ -77,8 +76,8 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
     /// ```
     ///
     /// # Errors
-    /// Those of [`fit`](Self::fit), and [`TpsError::Stopped`] if `watch` returns `Break` before
-    /// there is a spline.
+    /// Those of [`fit`](Self::fit), and [`TpsError::Stopped`] if `watch` returns `Break` before a
+    /// spline exists.
     pub fn fit_watched(
         sources: &[Point<f64, D>],
         targets: &[Point<f64, M>],
@@ -89,7 +88,7 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
     }
 }
 
-/// Source points with their kernel matrix factored: splines to any targets follow in O(n²).
+/// Source points with their factored kernel matrix. Splines to any targets follow in O(n²).
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -109,13 +108,13 @@ pub struct Factorization<const D: usize, K = R2LogR> {
     pub(super) centres: Centres<D>,
     system: System<D>,
     pub(super) weights: Option<Vec<f64>>,
-    /// Weight of every centre, empty if all weights are one.
+    /// Weight of each centre. Empty if all weights are one.
     pub(super) centre_weights: Vec<f64>,
     smoothing: Smoothing,
     rank_tolerance: f64,
-    /// The preconditioner, if the solver iterates. The system is then without a factor.
+    /// The preconditioner, if the solver iterates. The system then has no factor.
     iterative: Option<Iterative<D>>,
-    /// Residual at which iteration stops.
+    /// Residual at which the iteration stops.
     tolerance: f64,
 }
 
@@ -129,7 +128,7 @@ pub struct Factorization<const D: usize, K = R2LogR> {
 /// let factorization = Factorization::new(&sources, &FitOptions::default())?;
 /// let (mut workspace, mut spline) = (SplineWorkspace::default(), Spline::default());
 /// for step in 1..=3 {
-///     // No allocation from the second round on.
+///     // No allocation from the second iteration on.
 ///     let targets = sources.map(|p| Point2::new(p.x, p.y * f64::from(step)));
 ///     factorization.refit_with(&mut workspace, &targets, None, None, &mut spline)?;
 ///     assert!((spline.apply(&sources[4]) - targets[4]).norm() < 1e-14);
@@ -145,18 +144,18 @@ pub struct SplineWorkspace<const D: usize> {
     centre_weights: Vec<f64>,
 }
 
-/// Largest λ in the frame's units. The spline has long been the affine fit, to rounding; an infinite
-/// λ would leave no system.
+/// Largest λ in the units of the frame. Well below it the spline already equals the affine fit to
+/// rounding, whereas an infinite λ would give no system.
 const LARGEST_LAMBDA: f64 = 1e200;
 
-/// A system with what is to be solved with it.
+/// A system with the parameters of its solution.
 struct Task<'a, const D: usize> {
     system: &'a System<D>,
     weights: Option<&'a [f64]>,
     smoothing: Smoothing,
-    /// Measure the residual and refine sooner.
+    /// Whether to measure the residual and refine sooner.
     careful: bool,
-    /// Where there is no factor.
+    /// The preconditioner, if there is no factor.
     iterative: Option<&'a Iterative<D>>,
 }
 
@@ -169,7 +168,7 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
         }
     }
 
-    /// λ in the frame's units: the kernel scales as length to its degree.
+    /// λ in the units of the frame: the kernel scales with the length to the power of its degree.
     pub(super) fn inner_lambda(&self, smoothing: Smoothing) -> f64 {
         match smoothing {
             Smoothing::Lambda(lambda) => f64::min(lambda / self.unit(), LARGEST_LAMBDA),
@@ -177,13 +176,13 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
         }
     }
 
-    /// How much larger the kernel is outside than in the frame.
+    /// Ratio of the kernel outside to that in the frame.
     pub(super) fn unit(&self) -> f64 {
         let degree = self.kernel.degree().unwrap_or(0);
         self.centres.frame.scale.powi(degree)
     }
 
-    /// One finite target for each source.
+    /// Checks that there is one finite target per source.
     pub(super) fn check<const M: usize>(&self, targets: &[Point<f64, M>]) -> Result<(), TpsError> {
         same_count("target points", self.centres.inputs, targets.len())?;
         finite(targets, "target points")
@@ -193,7 +192,7 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
 impl<const D: usize, K: Kernel> Factorization<D, K> {
     /// Factors `sources` for the kernel, weights and λ of `options`: O(n³/3) time, O(n²) memory.
     ///
-    /// With [`Smoothing::Gcv`] the matrix is decomposed instead, at some twenty times the cost.
+    /// With [`Smoothing::Gcv`] the matrix is decomposed instead, at about twenty times the cost.
     /// Thousands of points, or [`Solver::Iterative`](crate::Solver), are prepared for iteration:
     /// O(n²) time, O(n) memory.
     ///
@@ -213,13 +212,13 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
     /// ```
     ///
     /// # Errors
-    /// [`TpsError`] for bad input, or a kernel that is not definite on these points.
+    /// [`TpsError`] for invalid input, or a kernel that is not positive definite on these points.
     pub fn new(sources: &[Point<f64, D>], options: &FitOptions<K>) -> Result<Self, TpsError> {
         Self::new_watched(sources, options, &mut |_| ControlFlow::Continue(()))
     }
 
-    /// As [`new`](Self::new), reporting the progress of an iterative solver's preparation
-    /// to `watch`, which may stop it.
+    /// Like [`new`](Self::new), but reports the progress of an iterative solver's preparation to
+    /// `watch`, which may stop it.
     pub(crate) fn new_watched(
         sources: &[Point<f64, D>],
         options: &FitOptions<K>,
@@ -231,7 +230,7 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
         }
         let kernel = options.kernel.clone();
         let mut centres = Centres::default();
-        // A kernel with a length of its own would become another one under a change of scale.
+        // A kernel with its own length scale would be changed by a rescaling.
         centres.take(sources, kernel.degree().is_some())?;
         let mut centre_weights = Vec::new();
         centres.weigh(options.weights.as_deref(), &mut centre_weights);
@@ -270,7 +269,7 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
 
     /// The spline to these targets, with the weights and smoothing of the factorisation.
     ///
-    /// Measures the residual, and refines the solution where the condition number is large.
+    /// It measures the residual, and refines the solution if the condition number is large.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -279,7 +278,7 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
     /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4,
     ///     0.6]].map(Point2::from);
     /// let factorization = Factorization::new(&sources, &FitOptions::default())?;
-    /// // Any number of outputs: here a height.
+    /// // Any number of outputs is possible: here a height.
     /// let heights = sources.map(|p| nalgebra::Point1::new(p.x * p.y));
     /// let surface = factorization.fit(&heights)?;
     /// assert!((surface.apply(&sources[3]) - heights[3]).norm() < 1e-14);
@@ -297,7 +296,7 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
         self.fit_watched(targets, |_| ControlFlow::Continue(()))
     }
 
-    /// As [`fit`](Self::fit), reporting the progress of an iterative solver to `watch`.
+    /// Like [`fit`](Self::fit), but reports the progress of an iterative solver to `watch`.
     pub(crate) fn fit_watched<const M: usize>(
         &self,
         targets: &[Point<f64, M>],
@@ -318,7 +317,7 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
         Ok(spline)
     }
 
-    /// A quick fit with what the factorisation was made with.
+    /// A quick fit with the parameters of the factorisation.
     fn own_task(&self) -> Task<'_, D> {
         Task {
             system: &self.system,
@@ -329,18 +328,16 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
         }
     }
 
-    /// New targets, weights and smoothing (`None`: those of the factorisation) for the same
-    /// sources.
+    /// Fits new targets, weights and smoothing for the same sources. `None` stands for the weights
+    /// of the factorisation.
     ///
-    /// The answer goes into a spline that is already there.
-    /// Nothing is allocated once workspace and spline have grown, but by a new cross-validation.
+    /// The result is written to an existing spline. Nothing is allocated once workspace and spline
+    /// have grown, except by a new cross-validation.
     ///
-    /// Unlike [`fit`](Self::fit) it measures no residual, and refines only where the condition
-    /// number exceeds 10⁸.
-    /// The same weights and λ cost two triangular solves.
-    /// Positive weights leave an interpolating spline as it is, and cost the same.
-    /// Other weights or another λ cost a factorisation, for an iterative solver a new
-    /// preconditioner.
+    /// Unlike [`fit`](Self::fit), it measures no residual and refines only if the condition number
+    /// exceeds 10⁸. The same weights and λ cost two triangular solves. Positive weights do not
+    /// change an interpolating spline, and cost the same. Other weights or another λ cost a
+    /// factorisation, or a new preconditioner for an iterative solver.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -358,14 +355,14 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
     ///         .refit_with(&mut workspace, &targets, Some(&weights), None, &mut spline)
     ///         .map(|()| (spline.apply(&sources[4]) - targets[4]).norm())
     /// };
-    /// // Trusted more, the point is met more closely.
+    /// // With a higher weight, the spline passes closer to the point.
     /// assert!(miss(100.0)? < 0.1 * miss(1.0)?);
     /// # Ok(())
     /// # }
     /// ```
     ///
     /// # Errors
-    /// [`TpsError`] for invalid targets, weights or smoothing. The spline is then left as it was.
+    /// [`TpsError`] for invalid targets, weights or smoothing. The spline is then unchanged.
     pub fn refit_with<const M: usize>(
         &self,
         workspace: &mut SplineWorkspace<D>,
@@ -413,15 +410,15 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
                 iterative: iterates.then_some(&*iterative),
             }
         };
-        // Nothing stops a fit without a callback.
+        // Without a callback nothing stops the fit.
         self.finish(&task, buffers, targets, spline, &mut |_| {
             ControlFlow::Continue(())
         })
     }
 
-    /// Whether the system at hand serves a refit.
+    /// Whether the existing system can be used for a refit.
     ///
-    /// An interpolating spline depends on its weights only in which of them are positive.
+    /// An interpolating spline depends on its weights only through which of them are positive.
     fn serves(&self, smoothing: Smoothing, centre_weights: &[f64]) -> bool {
         if smoothing == self.smoothing && centre_weights == self.centre_weights {
             return true;
@@ -434,7 +431,7 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
             && !self.centre_weights.contains(&0.0)
     }
 
-    /// A new factor, spectrum or preconditioner.
+    /// Computes a new factor, spectrum or preconditioner.
     fn build(
         &self,
         smoothing: Smoothing,
@@ -458,7 +455,7 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
         Ok(())
     }
 
-    /// Solves and fills the spline, reporting an iteration's progress to `watch`.
+    /// Solves and fills the spline, reporting the progress of an iteration to `watch`.
     fn finish<const M: usize>(
         &self,
         task: &Task<'_, D>,
@@ -471,17 +468,17 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
         let gcv = task.smoothing == Smoothing::Gcv;
         let mut lambda = self.inner_lambda(task.smoothing);
         self.check(targets)?;
-        // An interpolant cannot meet two targets at one point. Smoothing takes their mean.
+        // An interpolant cannot have two values at one point; smoothing uses their mean.
         if lambda == 0.0 && !gcv {
             centres.agree(targets, task.weights)?;
         }
-        // Targets far from zero lose digits. Differences to the first are exact where they are
-        // close to it.
+        // Targets far from zero lose digits. Differences from the first target are exact if the
+        // targets are close to it.
         let origin: [f64; M] = core::array::from_fn(|k| targets[0][k]);
         centres.gather(targets, task.weights, &origin, buffers);
         if gcv {
             let (needed, found) = (system.affine.q, system.active.len());
-            // Affine functions alone meet all targets: there is no residual to validate with.
+            // Affine functions alone reproduce all targets, so no residual is left for validation.
             if found <= needed {
                 return Err(TpsError::TooFewForValidation { needed, found });
             }
@@ -535,8 +532,8 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
         Ok(())
     }
 
-    /// Adds N (x − x₀) to a map of space: along the directions that the points do not span the
-    /// identity stands. x₀ is one of them.
+    /// Adds N (x − x₀) to a map of space, which makes it the identity along the directions that the
+    /// points do not span. x₀ is one of the points.
     fn keep_across<const M: usize>(
         &self,
         system: &System<D>,

@@ -1,11 +1,9 @@
 //! Matrix-free solution for thousands of points: preconditioned conjugate gradients.
 //!
-//! The dense factor takes n³/3 operations and 8n² bytes.
-//! Here a step takes one sum over all pairs, n² kernels and no memory.
-//! The preconditioner keeps the number of steps nearly independent of n.
-//! On the complement of the affine functions the matrix is definite, so conjugate gradients stay
-//! there:
-//! every direction satisfies the side conditions.
+//! The dense factor takes n³/3 operations and 8n² bytes. Here a step takes one sum over all pairs,
+//! with n² kernel evaluations and no memory. The preconditioner makes the number of steps nearly
+//! independent of n. On the complement of the affine functions the matrix is positive definite, and
+//! conjugate gradients stay there: each direction satisfies the side conditions.
 
 use core::ops::ControlFlow;
 
@@ -22,35 +20,35 @@ use crate::{
     span::{Coefficients, MAX},
 };
 
-/// Earlier points that a point is predicted from. With more the set-up costs more, with fewer there
-/// are more steps (`cargo bench -p tactile-benches --bench tps`).
+/// Number of earlier points from which a point is predicted. More make the set-up slower, fewer
+/// increase the number of steps (`cargo bench -p tactile-benches --bench tps`).
 const NEIGHBOURS: usize = 64;
 
-/// Points of the coarsest level, which are solved for exactly.
+/// Number of points of the coarsest level, which is solved exactly.
 const COARSE_POINTS: usize = 512;
 
-/// Steps at most.
+/// Maximum number of steps.
 const STEPS: usize = 200;
 
-/// A callback that receives a fit's progress and may stop it.
+/// A callback that receives the progress of a fit and may stop it.
 pub(super) type Watch<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + 'a;
 
-/// Points from coarse to fine with their preconditioner.
+/// Points from coarse to fine, with their preconditioner.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Iterative<const D: usize> {
-    /// Coordinates of the active centres in order, axis by axis.
+    /// Coordinates of the active centres in order, by axes.
     pub(super) axes: Vec<Vec<f64>>,
-    /// λ/weight of each, empty without λ.
+    /// λ/weight of each centre. Empty without λ.
     pub(super) diagonal: Vec<f64>,
     pub(super) preconditioner: Preconditioner<D>,
 }
 
-/// One run: its system and its stopping rule.
+/// One run with its system and stopping rule.
 pub(super) struct Run<'a, K, const D: usize> {
     pub(super) kernel: &'a K,
     pub(super) system: &'a System<D>,
     pub(super) iterative: &'a Iterative<D>,
-    /// Largest residual at a point, relative to the largest target, to stop at.
+    /// Residual at which to stop: the largest at a point, relative to the largest target.
     pub(super) tolerance: f64,
 }
 
@@ -66,9 +64,9 @@ impl<const D: usize> Iterative<D> {
         watch: &mut Watch<'_>,
     ) -> ControlFlow<()> {
         system.spectrum = None;
-        // Not scaled by the roots of weights: here they stand on the diagonal as λ/weight.
+        // Not scaled by the roots of the weights: here the weights are on the diagonal as λ/weight.
         system.choose(setting.centres.len(), weights, false);
-        // Every point is ordered first, and then given its weights.
+        // All points are ordered first and then given their weights.
         let n = system.active.len();
         let mut tell = |done| watch(&Progress::new(done, 2 * n));
         let spacing = self.arrange(setting.centres, system, &mut tell)?;
@@ -92,8 +90,8 @@ impl<const D: usize> Iterative<D> {
         (self.preconditioner).build(&ordered, &mut |weighted| tell(n + weighted))
     }
 
-    /// Orders the active points from coarse to fine. Gives the squared distance of each to the
-    /// nearest before it.
+    /// Orders the active points from coarse to fine. Returns the squared distance of each point to
+    /// the nearest one before it.
     fn arrange(
         &mut self,
         centres: &Centres<D>,
@@ -121,8 +119,8 @@ impl<const D: usize> Iterative<D> {
 }
 
 impl<K: Kernel, const D: usize> Run<'_, K, D> {
-    /// Solves for the targets in `buffers`. Weights come there. Stops early if `watch` returns
-    /// `Break`.
+    /// Solves for the targets in `buffers`, where the weights are stored. Stops early if `watch`
+    /// returns `Break`.
     pub(super) fn solve<const M: usize>(
         &self,
         buffers: &mut Buffers,
@@ -148,7 +146,7 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         solution.resize(M * n, 0.0);
         (report.condition, report.iterations, report.refinements) = (1.0, 0, 0);
         let (mut affine, mut broken) = ([[0.0; MAX]; M], false);
-        // At most three runs of steps. The fourth turn only measures the last residual.
+        // At most three runs of steps. The fourth pass only measures the last residual.
         for start in 0..=3 {
             let residual;
             (affine, residual) = self.residual::<M>(vectors);
@@ -159,8 +157,7 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
                 false if report.iterations >= STEPS => StopReason::IterationLimit,
                 false => StopReason::Stagnated,
             };
-            // Restarts from a residual formed anew, from which rounding has made the iterated one
-            // drift.
+            // Restarts with a recomputed residual, because rounding makes the iterated one drift.
             if report.stop != StopReason::Stagnated || start == 3 {
                 break;
             }
@@ -177,7 +174,7 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         affine
     }
 
-    /// Iterates until the residual it carries along is small enough.
+    /// Iterates until the iterated residual is small enough.
     fn steps<const M: usize>(
         &self,
         vectors: &mut Vectors,
@@ -188,7 +185,7 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         vectors.direction.resize(vectors.residual.len(), 0.0);
         let (mut size, mut best) = ([0.0; M], (f64::INFINITY, report.iterations));
         while report.iterations < STEPS {
-            // The residual of the recurrence, which costs no product with the matrix.
+            // The residual of the recurrence, which costs no matrix product.
             let left = relative(largest(&vectors.residual), &vectors.target);
             let done = report.iterations;
             let progress = Progress::new(done, STEPS).with_residual(left);
@@ -196,8 +193,8 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
             if left < 0.5 * best.0 {
                 best = (left, done);
             }
-            // Where 25 steps do not halve the residual, rounding allows no more.
-            // Half the tolerance leaves room for the drift of the recurrence.
+            // If 25 steps do not halve the residual, rounding prevents further progress. Half the
+            // tolerance leaves room for the drift of the recurrence.
             if left <= 0.5 * self.tolerance || done >= best.1 + 25 {
                 break;
             }
@@ -208,7 +205,7 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         ControlFlow::Continue(())
     }
 
-    /// The next direction p ← M⁻¹r + βp. `size` is rᵀM⁻¹r of each output.
+    /// The next direction p ← M⁻¹r + βp. `size` is rᵀM⁻¹r for each output.
     fn turn<const M: usize>(&self, vectors: &mut Vectors, size: &mut [f64; M]) {
         let n = self.system.active.len();
         let Vectors {
@@ -222,7 +219,7 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         self.iterative
             .preconditioner
             .apply::<M>(residual, preconditioned, n, coarse);
-        // Rounding leads out of the complement, where the matrix need not be definite.
+        // Rounding leaves the complement, outside which the matrix may be indefinite.
         self.complement(preconditioned);
         let new = inner::<M>(residual, preconditioned);
         for m in 0..M {
@@ -235,8 +232,8 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         *size = new;
     }
 
-    /// The step along the direction that makes the energy least. No step if `still_wanted` returns
-    /// `Break` before it is known.
+    /// Makes the step along the direction that minimises the energy. Makes no step if
+    /// `still_wanted` returns `Break` before it is computed.
     fn advance<const M: usize>(
         &self,
         vectors: &mut Vectors,
@@ -256,7 +253,7 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         self.subtract::<M>(direction, product, still_wanted)?;
         let curvature = inner::<M>(direction, product);
         for m in 0..M {
-            // The product comes with its sign turned.
+            // The product has the opposite sign.
             let alpha = ratio(size[m], -curvature[m]);
             for i in m * n..(m + 1) * n {
                 solution[i] += alpha * direction[i];
@@ -267,7 +264,7 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         ControlFlow::Continue(())
     }
 
-    /// r ← r − (K + λW⁻¹) w. Unfinished if `still_wanted` returns `Break`.
+    /// r ← r − (K + λW⁻¹) w. Incomplete if `still_wanted` returns `Break`.
     fn subtract<const M: usize>(
         &self,
         w: &[f64],
@@ -276,8 +273,8 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
     ) -> ControlFlow<()> {
         let (n, places) = (self.system.active.len(), self.iterative.axes());
         let weights: [&[f64]; M] = core::array::from_fn(|m| &w[m * n..(m + 1) * n]);
-        // Whole blocks, so that the sums are the same however often `still_wanted` is called.
-        // Some seconds lie between two calls: 2³⁰ kernels.
+        // Whole blocks, so that the sums do not depend on how often `still_wanted` is called.
+        // Several seconds pass between two calls: 2³⁰ kernel evaluations.
         let run = ((1 << 30) / BLOCK / n.max(1)).max(1) * BLOCK;
         for start in (0..n).step_by(run) {
             if start > 0 {
@@ -301,7 +298,7 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         ControlFlow::Continue(())
     }
 
-    /// Forms the residual anew: y − (K + λW⁻¹)w − P a with the a that makes it least, and its
+    /// Recomputes the residual: y − (K + λW⁻¹)w − P a with the a that minimises it. Returns its
     /// largest entry relative to the largest target.
     fn residual<const M: usize>(&self, vectors: &mut Vectors) -> ([Coefficients; M], f64) {
         let Vectors {
@@ -312,7 +309,7 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         } = vectors;
         self.complement(solution);
         residual.clone_from(target);
-        // To the end: the affine part of what is returned comes from it.
+        // Without interruption, because the affine part of the result depends on it.
         let _ = self.subtract::<M>(solution, residual, &mut || ControlFlow::Continue(()));
         let basis = &self.system.affine;
         let mut affine = [[0.0; MAX]; M];
@@ -337,16 +334,16 @@ fn inner<const M: usize>(a: &[f64], b: &[f64]) -> [f64; M] {
     core::array::from_fn(|m| dot(&a[m * n..(m + 1) * n], &b[m * n..(m + 1) * n]))
 }
 
-/// a / b, zero where b is zero or not finite: an output that has converged or not begun.
+/// a / b, or zero if b is zero or not finite: for an output that has converged or not started.
 fn ratio(a: f64, b: f64) -> f64 {
     if b > 0.0 && b.is_finite() { a / b } else { 0.0 }
 }
 
-/// Orders points by farthest-point sampling from the one nearest to the origin. O(n²) time.
+/// Orders points by farthest-point sampling, starting from the one nearest to the origin. O(n²)
+/// time.
 ///
-/// Gives the order, and the squared distance of each point to the nearest before it (infinite for
-/// the first).
-/// Stops if `watch`, which receives the number of ordered points, returns `Break`.
+/// Returns the order, and the squared distance of each point to the nearest one before it (infinite
+/// for the first). Stops if `watch`, which receives the number of ordered points, returns `Break`.
 fn coarse_to_fine<const D: usize>(
     axes: [&[f64]; D],
     watch: &mut dyn FnMut(usize) -> ControlFlow<()>,
@@ -367,7 +364,7 @@ fn coarse_to_fine<const D: usize>(
             from: axes.map(|axis| axis[i]),
             near: &mut near,
         });
-        // A point that is taken is never the farthest again.
+        // A selected point is never the farthest again.
         near[i] = -1.0;
         next = near
             .iter()
@@ -377,7 +374,7 @@ fn coarse_to_fine<const D: usize>(
     ControlFlow::Continue((order, distances))
 }
 
-/// Lowers every distance to that from one more point. Gives the largest.
+/// Updates all distances with one more point. Returns the largest.
 struct Approach<'a, const D: usize> {
     axes: [&'a [f64]; D],
     from: [f64; D],
@@ -395,7 +392,7 @@ impl<const D: usize> Job for Approach<'_, D> {
             let s = squared_distance(axes, i, place).get();
             self.near[i] = if s < self.near[i] { s } else { self.near[i] };
         }
-        // Eight running maxima, which the compiler turns into one vector.
+        // Eight running maxima, which the compiler combines into one vector.
         let mut largest = [-1.0; 8];
         let chunks = self.near.chunks_exact(8);
         let rest = chunks.remainder();
@@ -414,7 +411,7 @@ impl<const D: usize> Job for Approach<'_, D> {
     }
 }
 
-/// Squared distances of the first points from a place.
+/// Squared distances of the first points from a position.
 struct Distances<'a, const D: usize> {
     axes: [&'a [f64]; D],
     from: [f64; D],
@@ -434,19 +431,20 @@ impl<const D: usize> Job for Distances<'_, D> {
     }
 }
 
-/// Finds, point by point in the order from coarse to fine, the nearest of the earlier ones.
+/// Finds the nearest earlier points of each point, in the order from coarse to fine.
 #[derive(Default)]
 struct Nearest {
     distances: Vec<f64>,
     candidates: Vec<(f64, usize)>,
-    /// Squared radius searched first, in units of the point's own distance to the earlier ones.
+    /// Squared radius searched first, relative to the point's own squared distance to the earlier
+    /// ones.
     reach: f64,
 }
 
 impl Nearest {
-    /// The `count` nearest to point `i` among the points before it, in rising order of place.
+    /// The `count` nearest to point `i` among the points before it, in ascending order of index.
     ///
-    /// `spacing` is its squared distance to the nearest.
+    /// `spacing` is the squared distance of point `i` to the nearest of them.
     fn find<const D: usize>(
         &mut self,
         axes: [&[f64]; D],
@@ -472,7 +470,7 @@ impl Nearest {
         found.sort_unstable();
     }
 
-    /// Makes the points within a distance candidates that leaves at least `count` of them.
+    /// Collects the points within a distance that includes at least `count` of them as candidates.
     fn gather(&mut self, spacing: f64, count: usize) {
         let mut reach = f64::max(self.reach, 1.0);
         loop {
@@ -481,7 +479,7 @@ impl Nearest {
                 .iter()
                 .copied()
                 .enumerate()
-                // A scan of the distances avoids a search tree and stays within the O(n²) of the
+                // Scanning the distances avoids a search tree and stays within the O(n²) of the
                 // set-up.
                 .filter(|&(_, d)| d <= reach * spacing);
             self.candidates.clear();
@@ -491,7 +489,8 @@ impl Nearest {
             }
             reach *= 1.5;
         }
-        // Slowly down again, so that one point in a corner does not set the pace for all.
+        // The reach decreases slowly again, so that one point in a corner does not slow down all
+        // others.
         self.reach = 0.98 * reach;
     }
 }
@@ -499,42 +498,41 @@ impl Nearest {
 /// A sparse inverse Cholesky factor of the kernel matrix on the complement: Σ wᵢ wᵢᵀ over the
 /// points.
 ///
-/// Points are ordered from coarse to fine. Point i adds its error of prediction from those before
-/// it, cᵢ(y) = yᵢ − f(xᵢ) with f the spline through the earlier points.
-/// Such errors are uncorrelated in the kernel's product: wᵢᵀA wⱼ = δᵢⱼ after scaling, so that A⁻¹ =
-/// Σ wᵢ wᵢᵀ.
-/// Here f goes through the nearest earlier points only (Vecchia 1988; Schäfer, Katzfuss & Owhadi
-/// 2021).
-/// The weights of the spline with value one at xᵢ and zero at its neighbours are wᵢ √wᵢᵢ.
-/// All of them satisfy the side conditions, which conditionally definite kernels need.
+/// Points are ordered from coarse to fine. Point i contributes its prediction error from the points
+/// before it, cᵢ(y) = yᵢ − f(xᵢ), with f the spline through the earlier points. These errors are
+/// uncorrelated in the inner product of the kernel: wᵢᵀA wⱼ = δᵢⱼ after scaling, so A⁻¹ = Σ wᵢ wᵢᵀ.
+/// Here f uses only the nearest earlier points (Vecchia 1988; Schäfer, Katzfuss & Owhadi 2021). The
+/// weights of the spline with value one at xᵢ and zero at its neighbours are wᵢ √wᵢᵢ. All of them
+/// satisfy the side conditions, as conditionally positive definite kernels require.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Preconditioner<const D: usize> {
-    /// The first points, factored.
+    /// The factored system of the first points.
     coarse: System<D>,
     coarse_points: usize,
-    /// Of each later point: itself and its neighbours,
+    /// For each later point, its own index and those of its neighbours,
     places: Vec<u32>,
     /// and their weights.
     weights: Vec<f64>,
     row: usize,
 }
 
-/// The points in order and what stands on the diagonal.
+/// The points in order, with the diagonal.
 struct Ordered<'a, K, const D: usize> {
     kernel: &'a K,
     centres: &'a Centres<D>,
     /// Centre of each point.
     order: &'a [usize],
     axes: [&'a [f64]; D],
-    /// Squared distance to the nearest before it.
+    /// Squared distance to the nearest point before it.
     spacing: &'a [f64],
-    /// Weights of the points, empty if all are one.
+    /// Weights of the points. Empty if all are one.
     weights: &'a [f64],
     lambda: f64,
 }
 
 impl<K: Kernel, const D: usize> Ordered<'_, K, D> {
-    /// Factors the system of the points at these places. `false` if rounding leaves it indefinite.
+    /// Factors the system of the points with these indices. Returns `false` if rounding leaves it
+    /// indefinite.
     fn factor(
         &self,
         places: &[usize],
@@ -557,7 +555,7 @@ impl<K: Kernel, const D: usize> Ordered<'_, K, D> {
     }
 }
 
-/// Splines of value one at the last of a few points and zero at the others, one after the other.
+/// Splines with value one at the last of a few points and zero at the others, computed one by one.
 struct Cardinal<'a, K, const D: usize> {
     points: &'a Ordered<'a, K, D>,
     local: Centres<D>,
@@ -580,8 +578,8 @@ impl<'a, K: Kernel, const D: usize> Cardinal<'a, K, D> {
         }
     }
 
-    /// The weights of the spline of the points at these places. The unit vector itself where there
-    /// is none.
+    /// The weights of the spline of the points with these indices. If there is no spline, the unit
+    /// vector.
     fn weights(&mut self, places: &[usize]) -> &[f64] {
         let Self {
             points,
@@ -604,7 +602,7 @@ impl<'a, K: Kernel, const D: usize> Cardinal<'a, K, D> {
 impl<const D: usize> Preconditioner<D> {
     /// Builds the factor: O(n m³ + n²) for m neighbours.
     ///
-    /// Stops if `watch`, which receives the number of points done, returns `Break`.
+    /// Stops if `watch`, which receives the number of completed points, returns `Break`.
     fn build<K: Kernel>(
         &mut self,
         points: &Ordered<'_, K, D>,
@@ -613,7 +611,7 @@ impl<const D: usize> Preconditioner<D> {
         let n = points.order.len();
         self.coarse_points = n.min(COARSE_POINTS);
         let first: Vec<usize> = (0..self.coarse_points).collect();
-        // Without a coarse factor all points from D + 2 on have a row of their own.
+        // Without a coarse factor, all points from D + 2 on have their own row.
         if !points.factor(
             &first,
             &mut points.centres.clone(),
@@ -639,11 +637,11 @@ impl<const D: usize> Preconditioner<D> {
         ControlFlow::Continue(())
     }
 
-    /// Takes over the weights of a cardinal spline, scaled to unit energy.
+    /// Stores the weights of a cardinal spline, scaled to unit energy.
     fn push(&mut self, places: &[usize], unit: &[f64]) {
         let own = unit[unit.len() - 1];
-        // Without a factor or by rounding the energy may not be positive. The point then adds
-        // nothing.
+        // If the factorisation failed, or because of rounding, the energy may not be positive. The
+        // point then contributes nothing.
         let scale = if own > 0.0 && own.is_finite() {
             1.0 / own.sqrt()
         } else {
@@ -653,12 +651,12 @@ impl<const D: usize> Preconditioner<D> {
         self.weights.extend(unit.iter().map(|w| w * scale));
         let padding = self.row - places.len();
         self.places
-            // Rows of one length need no table of starts. Padding has weight 0.
+            // Rows of equal length need no table of starts. Padding has weight 0.
             .extend(core::iter::repeat_n(places[0] as u32, padding));
         self.weights.extend(core::iter::repeat_n(0.0, padding));
     }
 
-    /// z = Σ wᵢ wᵢᵀ r for `M` columns of `n` places.
+    /// z = Σ wᵢ wᵢᵀ r for `M` columns of `n` entries.
     fn apply<const M: usize>(&self, r: &[f64], z: &mut [f64], n: usize, spare: &mut [Vec<f64>; 2]) {
         z.fill(0.0);
         for (places, weights) in self

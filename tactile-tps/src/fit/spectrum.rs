@@ -1,4 +1,4 @@
-//! The eigenvalues and eigenvectors of a symmetric matrix: any λ then costs two products.
+//! The eigenvalues and eigenvectors of a symmetric matrix, with which any λ costs two products.
 
 use faer::{
     Accum, Mat, MatMut, MatRef, Par, Spec,
@@ -47,8 +47,8 @@ impl Spectrum {
             memory(&mut stack, scratch),
             parameters,
         );
-        // Without convergence, which finite symmetric matrices do not fail, the spectrum counts as
-        // singular.
+        // If the solver does not converge, which does not happen for finite symmetric matrices, the
+        // spectrum counts as singular.
         if done.is_err() {
             self.values.fill(0.0);
         }
@@ -76,13 +76,14 @@ impl Spectrum {
         self.coefficients(b, spare);
         for column in spare.chunks_exact_mut(self.values.len()) {
             let pairs = column.iter_mut().zip(&self.values);
-            // In the eigenvectors λ is a shift of the eigenvalues: any λ costs two products.
+            // In the basis of eigenvectors λ is a shift of the eigenvalues, so any λ costs two
+            // products.
             pairs.for_each(|(c, mu)| *c /= mu + lambda);
         }
         self.product(self.vectors.as_ref(), spare, b);
     }
 
-    /// 2-norm condition number of A + λI. Infinite where rounding leaves eigenvalues that are not
+    /// 2-norm condition number of A + λI. Infinite if rounding leaves eigenvalues that are not
     /// positive.
     pub(super) fn condition(&self, lambda: f64) -> f64 {
         let ends = self.values.first().zip(self.values.last());

@@ -17,7 +17,7 @@ use crate::{
 pub(super) struct Setting<'a, K, const D: usize> {
     pub(super) kernel: &'a K,
     pub(super) centres: &'a Centres<D>,
-    /// Share of the largest extent below which a direction counts as not spanned.
+    /// Fraction of the largest extent below which a direction counts as not spanned.
     pub(super) rank_tolerance: f64,
 }
 
@@ -30,7 +30,7 @@ pub(super) struct System<const D: usize> {
     pub(super) scales: Vec<f64>,
     pub(super) span: Span<D>,
     pub(super) affine: AffineBasis,
-    /// SQ without λ, column by column, and columns of zeros.
+    /// SQ without λ, by columns, padded with zero columns.
     pub(super) coupling: Vec<f64>,
     /// σ.
     pub(super) shift: f64,
@@ -42,7 +42,8 @@ pub(super) struct System<const D: usize> {
 }
 
 impl<const D: usize> System<D> {
-    /// Factors for centre weights (empty: all one) and λ ≥ 0: n³/3 multiplications and additions.
+    /// Factors for centre weights (empty: all one) and λ ≥ 0, in n³/3 multiplications and
+    /// additions.
     pub(super) fn factor<K: Kernel>(
         &mut self,
         setting: &Setting<'_, K, D>,
@@ -53,9 +54,9 @@ impl<const D: usize> System<D> {
         let size = self.assemble(setting, weights, lambda > 0.0);
         self.matrix.add_to_diagonal(lambda);
         if self.matrix.factor().is_err() {
-            // Points nearly coincide, and rounding has left the matrix indefinite. A λ of the size
-            // of that rounding moves values by no more than it. A kernel that is not definite fails
-            // again.
+            // If points nearly coincide, rounding has made the matrix indefinite. A λ of the size
+            // of this rounding changes values by no more than it. A kernel that is not positive
+            // definite fails again.
             self.assemble(setting, weights, lambda > 0.0);
             let rounding = f64::EPSILON * self.active.len() as f64 * (size + lambda);
             self.matrix.add_to_diagonal(lambda + rounding);
@@ -64,7 +65,7 @@ impl<const D: usize> System<D> {
             return Ok(());
         }
         self.condition = 1.0;
-        // With affine functions alone nothing but σ is left of the matrix.
+        // If there are only affine functions, the matrix consists of σ alone.
         if self.active.len() > self.affine.q {
             let inverse = self.matrix.inverse_norm(&mut self.scratch);
             self.condition = f64::max(1.0, (size + lambda) * inverse);
@@ -72,7 +73,7 @@ impl<const D: usize> System<D> {
         Ok(())
     }
 
-    /// Decomposes for centre weights and any λ > 0: some 10 n³ operations.
+    /// Decomposes for centre weights and any λ > 0, in about 10 n³ operations.
     pub(super) fn decompose<K: Kernel>(&mut self, setting: &Setting<'_, K, D>, weights: &[f64]) {
         self.assemble(setting, weights, true);
         self.spectrum
@@ -80,7 +81,7 @@ impl<const D: usize> System<D> {
             .decompose(&mut self.matrix);
     }
 
-    /// Condition number of the matrix, with `lambda` added to a decomposed one.
+    /// Condition number of the matrix, with `lambda` added if it is decomposed.
     pub(super) fn condition(&self, lambda: f64) -> f64 {
         self.spectrum
             .as_ref()
@@ -119,8 +120,8 @@ impl<const D: usize> System<D> {
         let head =
             |i: usize, k: usize| dot(self.affine.column(i), &self.coupling[k * n..(k + 1) * n]);
         let trace = self.matrix.trace() - (0..q).map(|k| head(k, k)).sum::<f64>();
-        // No point is left where all of them are affine functions' own.
-        // The trace on the range of Π is the whole trace less that on the affine functions.
+        // If all points are used by the affine functions, no point is left. The trace on the range
+        // of Π is the total trace minus that on the affine functions.
         let mean = trace / (n - q).max(1) as f64;
         let shift = if mean > 0.0 && n > q { mean } else { 1.0 };
         let x = &mut self.scratch;
@@ -139,11 +140,11 @@ impl<const D: usize> System<D> {
             x,
             matrix: &mut self.matrix,
         });
-        // The update has added σ in q directions, which are no part of ΠSΠ.
+        // The update has added σ in q directions, which do not belong to ΠSΠ.
         f64::max(squares - q as f64 * shift * shift, 0.0).sqrt()
     }
 
-    /// Centres of positive weight, and their scales.
+    /// Selects centres of positive weight, with their scales.
     pub(super) fn choose(&mut self, n: usize, weights: &[f64], scaled: bool) {
         self.active.clear();
         self.scales.clear();
@@ -155,7 +156,7 @@ impl<const D: usize> System<D> {
         }
     }
 
-    /// The coordinates of the active centres, axis by axis, into `scratch`.
+    /// Writes the coordinates of the active centres, by axes, into `scratch`.
     pub(super) fn places(&mut self, centres: &Centres<D>) {
         self.scratch.clear();
         for axis in &centres.axes {
@@ -163,7 +164,7 @@ impl<const D: usize> System<D> {
         }
     }
 
-    /// Finds what the active centres span and the affine functions at them.
+    /// Computes the directions that the active centres span, and the affine functions there.
     pub(super) fn outline<K>(&mut self, setting: &Setting<'_, K, D>) {
         let centres = setting.centres;
         self.places(centres);
@@ -179,8 +180,8 @@ impl<const D: usize> System<D> {
             });
     }
 
-    /// The λ of least generalised cross-validation for values at all centres. The system must be
-    /// decomposed.
+    /// The λ that minimises the generalised cross-validation score for values at all centres. The
+    /// system must be decomposed.
     pub(super) fn cross_validate<const M: usize>(
         &self,
         y: &[f64],
@@ -204,7 +205,7 @@ impl<const D: usize> System<D> {
     /// Solves for `M` outputs: `y` holds the values at all centres and receives the weights w.
     /// Returns the affine parts.
     ///
-    /// `lambda` is added to a decomposed system. A factored one has its own.
+    /// `lambda` is added to a decomposed system. A factored system has its own λ.
     pub(super) fn solve<const M: usize>(
         &self,
         y: &mut [f64],
@@ -219,7 +220,7 @@ impl<const D: usize> System<D> {
             None => self.matrix.solve(work),
         }
         for (head, column) in heads.iter_mut().zip(work.chunks_exact_mut(n)) {
-            // The exact solution lies in the range of Π. Rounding is taken off.
+            // The exact solution is in the range of Π; this removes rounding errors.
             self.affine.remove(column);
             for (head, coupling) in head.iter_mut().zip(self.coupling.chunks_exact(n)) {
                 // Qᵀ of the first equation: R a = Qᵀ(W^½y − S v).
@@ -231,7 +232,7 @@ impl<const D: usize> System<D> {
         heads
     }
 
-    /// Π W^½ y in `work`. Returns QᵀW^½ y, output by output.
+    /// Computes Π W^½ y in `work`. Returns QᵀW^½ y, by outputs.
     pub(super) fn reduce<const M: usize>(
         &self,
         y: &[f64],
@@ -252,7 +253,7 @@ impl<const D: usize> System<D> {
         heads
     }
 
-    /// Spreads the columns of `work`, each entry times its scale, over the centres.
+    /// Distributes the columns of `work`, each entry times its scale, to the centres.
     pub(super) fn scatter(&self, work: &[f64], y: &mut [f64]) {
         let n = self.active.len();
         let columns = work.len() / n;
@@ -266,10 +267,10 @@ impl<const D: usize> System<D> {
     }
 }
 
-/// Writes the lower triangle of W^½KW^½, and its product with Q while each column is at hand.
+/// Writes the lower triangle of W^½KW^½ and, while a column is in cache, its product with Q.
 struct Assemble<'a, K, const D: usize> {
     kernel: &'a K,
-    /// Coordinates axis by axis, then the scales.
+    /// Coordinates by axes, then the scales.
     places: &'a [f64],
     basis: &'a [f64],
     matrix: &'a mut Triangle,
@@ -299,8 +300,8 @@ impl<K: Kernel, const D: usize> Job for Assemble<'_, K, D> {
     }
 }
 
-/// What column `j` of a symmetric matrix, given from the diagonal on, adds to Y = SQ on both sides
-/// of the diagonal.
+/// Adds to Y = SQ the contribution of column `j` of a symmetric matrix, given from the diagonal on,
+/// on both sides of the diagonal.
 #[inline(always)]
 fn add_column<L: Lane>(column: &[f64], j: usize, basis: &[f64], product: &mut [f64]) {
     let n = basis.len() / MAX;
@@ -328,12 +329,12 @@ fn add_column<L: Lane>(column: &[f64], j: usize, basis: &[f64], product: &mut [f
             tail += column[i] * v[i];
             y[i] = own.mul_add(L::from_f64(column[i]), L::from_f64(y[i])).get();
         }
-        // Both sums have counted the diagonal.
+        // Both sums contain the diagonal.
         y[0] += sums[c].iter().sum::<f64>() + tail - column[0] * v[0];
     }
 }
 
-/// A ← A − QXᵀ − XQᵀ in the lower triangle. Gives the squared Frobenius norm of the whole.
+/// A ← A − QXᵀ − XQᵀ in the lower triangle. Returns the squared Frobenius norm of the whole matrix.
 struct Update<'a> {
     basis: &'a [f64],
     x: &'a [f64],
@@ -351,7 +352,7 @@ impl Job for Update<'_> {
             let column = self.matrix.column(j);
             let whole = column.len() / 8 * 8;
             for at in (0..whole).step_by(8) {
-                // A copy of eight stays in registers.
+                // A copy of eight entries stays in registers.
                 let mut a = [0.0; 8];
                 a.copy_from_slice(&column[at..at + 8]);
                 for c in 0..MAX {

@@ -10,12 +10,12 @@ use faer::{
 
 use crate::{TpsError, lanes::dot};
 
-/// The lower triangle of a symmetric matrix, column by column, and its Cholesky factor in the same
-/// place.
+/// The lower triangle of a symmetric matrix, by columns, and its Cholesky factor in the same
+/// memory.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Triangle {
     pub(super) n: usize,
-    /// Places from one column to the next.
+    /// Offset from one column to the next.
     pub(super) stride: usize,
     pub(super) data: Vec<f64>,
     pub(super) stack: Vec<MaybeUninit<u8>>,
@@ -26,13 +26,13 @@ impl Triangle {
     pub(super) fn resize(&mut self, n: usize) {
         self.n = n;
         self.stride = n.next_multiple_of(8);
-        // Columns a multiple of 512 bytes apart would crowd into the same few sets of the cache.
+        // Columns at multiples of 512 bytes would map to the same few cache sets.
         if self.stride.is_multiple_of(64) {
             self.stride += 8;
         }
         let length = n * self.stride;
         if self.data.capacity() < length {
-            // A new allocation comes zeroed from the system, page by page as it is touched.
+            // A new allocation is zeroed by the system, page by page on first access.
             self.data = vec![0.0; length];
         } else {
             self.data.resize(length, 0.0);
@@ -57,7 +57,7 @@ impl Triangle {
         MatRef::from_column_major_slice_with_stride(&self.data, self.n, self.n, self.stride)
     }
 
-    /// Factors in place. Fails with the column whose pivot is not positive.
+    /// Factors in place. On failure returns the column whose pivot is not positive.
     pub(super) fn factor(&mut self) -> Result<(), TpsError> {
         let Self {
             n,
@@ -79,26 +79,26 @@ impl Triangle {
                 Err(TpsError::NotDefinite { column: index })
             }
             Ok(_) => {
-                // An infinite entry gives pivots that are not numbers.
+                // An infinite entry gives pivots that are NaN.
                 let bad = (0..self.n).find(|&j| !self.data[j * self.stride + j].is_finite());
                 bad.map_or(Ok(()), |column| Err(TpsError::NotDefinite { column }))
             }
         }
     }
 
-    /// b ← A⁻¹b for columns of n entries, by the factor.
+    /// b ← A⁻¹b for columns of n entries, using the factor.
     pub(super) fn solve(&self, b: &mut [f64]) {
         let columns = b.len() / self.n;
         let b = MatMut::from_column_major_slice_mut(b, self.n, columns);
         llt::solve::solve_in_place(self.view(), b, Par::Seq, MemStack::new(&mut []));
     }
 
-    /// An estimate of the 2-norm of A⁻¹: two steps of inverse iteration from the column of the
-    /// least pivot.
+    /// An estimate of the 2-norm of A⁻¹: two steps of inverse iteration, starting from the column
+    /// with the smallest pivot.
     pub(super) fn inverse_norm(&self, x: &mut Vec<f64>) -> f64 {
         let pivot = |j: usize| self.data[j * self.stride + j];
-        // The column of the least pivot tends to be close to the direction that the inverse
-        // enlarges most.
+        // The column of the smallest pivot tends to be close to the direction that the inverse
+        // amplifies most.
         let start = (1..self.n).fold(
             0,
             |least, j| if pivot(j) < pivot(least) { j } else { least },
@@ -116,7 +116,7 @@ impl Triangle {
     }
 }
 
-/// A stack of at least the size asked for, in memory that is kept.
+/// A stack of at least the requested size, in reusable memory.
 pub(super) fn memory(kept: &mut Vec<MaybeUninit<u8>>, size: StackReq) -> &mut MemStack {
     kept.resize(size.unaligned_bytes_required(), MaybeUninit::uninit());
     MemStack::new(kept)

@@ -1,11 +1,12 @@
-//! The grain of numbers: whole pixels, thousandths of a millimetre.
+//! The grain of coordinates, such as whole pixels or thousandths of a millimetre.
 
 use nalgebra::Point;
 
-/// Grains from a thousand down, in powers of ten. Finer ones are no less than double precision.
+/// Exponents of the tested grains, in powers of ten. Finer grains are not distinguishable from
+/// double precision.
 const POWERS: std::ops::RangeInclusive<i32> = -12..=3;
 
-/// Standard deviation of a number that is rounded to a grain of 1.
+/// Standard deviation of a number rounded to a grain of 1.
 const OF_ROUNDING: f64 = 0.288_675;
 
 /// The largest power of ten of which all coordinates are multiples. Zero if there is none.
@@ -15,7 +16,7 @@ pub(super) fn of_pairs<const D: usize>(
 ) -> f64 {
     let multiple = |x: f64, grain: f64| {
         let steps = x / grain;
-        // What decimals are rounded to in binary.
+        // Tolerance for decimals rounded to binary.
         (steps - steps.round()).abs() <= 1e-15 * steps.abs() + 1e-9 && steps.abs() < 1e14
     };
     let mut power = *POWERS.end();
@@ -30,7 +31,7 @@ pub(super) fn of_pairs<const D: usize>(
     10_f64.powi(power)
 }
 
-/// The least noise of a coordinate: its rounding.
+/// The minimum noise of a coordinate: its rounding.
 pub(super) fn least_noise<const D: usize>(
     sources: &[Point<f64, D>],
     targets: &[Point<f64, D>],

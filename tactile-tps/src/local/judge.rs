@@ -1,21 +1,25 @@
-//! Which pairs contradict their neighbours.
+//! Detection of pairs that contradict their neighbours.
 
 use super::{BLOCK, Found, Point, SVector, nearest_rows, tree::Tree};
 
-/// Standard deviations from the prediction by the others. Fewer drop the largest residuals of a
-/// steep field, whose noise is not Gaussian.
+/// Maximum deviation from the prediction by the other pairs, in standard deviations. A smaller
+/// limit would reject the largest residuals of a steep field, whose noise is not Gaussian.
 const DEVIATIONS: f64 = 6.0;
 
-/// A pair that lies so near to its place, in spacings, does no harm, whatever its neighbours' noise.
+/// A pair this close to its prediction, in spacings, does no harm, whatever the noise of its
+/// neighbours.
 const NEAR: f64 = 0.15;
 
-/// Neighbours that may have moved along. Beside a straight crack half of them did.
+/// Number of neighbours that are checked for a common motion. Next to a straight crack, half of
+/// them have it.
 const NEIGHBOURS: usize = 8;
 
-/// So many of them show that a pair is right: two wrong pairs may meet by chance.
+/// Number of neighbours with a common motion that confirm a pair: two wrong pairs may agree by
+/// chance.
 const COMPANY: usize = 3;
 
-/// A neighbour moved along if it did to this share of the distance from the prediction.
+/// A neighbour shares the motion if it agrees within this fraction of the distance from the
+/// prediction.
 const ALONG: f64 = 0.3;
 
 /// Whether each pair contradicts its neighbours.
@@ -31,7 +35,7 @@ pub(super) fn contradicted<const D: usize>(
         let mut misfits: Vec<f64> = block.iter().map(|&i| found[i].misfit).collect();
         let middle = misfits.len() / 2;
         let median = *misfits.select_nth_unstable_by(middle, f64::total_cmp).1;
-        // Median of χ² with D degrees, by Wilson and Hilferty.
+        // Median of χ² with D degrees of freedom, by Wilson and Hilferty.
         let usual = D as f64 * (1.0 - 2.0 / (9.0 * D as f64)).powi(3);
         let limit = DEVIATIONS * DEVIATIONS * median / usual;
         let suspect = |&&i: &&usize| {
@@ -42,7 +46,7 @@ pub(super) fn contradicted<const D: usize>(
     let places: Vec<_> = suspects.iter().map(|&i| sources[i]).collect();
     let near = nearest_rows(sources, &places, NEIGHBOURS + 1);
     for (i, near) in suspects.into_iter().zip(near) {
-        // Beside a jump a pair is far from the prediction, and moved as those on its side.
+        // Next to a jump, a pair is far from the prediction but moves like those on its side.
         let agrees = |&&j: &&usize| {
             let along = found[i].trend * (sources[i] - sources[j]);
             let apart = displacements[i] - displacements[j] - along;

@@ -1,4 +1,4 @@
-//! Displacement and gradient from any number of pairs.
+//! Displacement field and gradient from any number of pairs.
 
 use crate::TpsError;
 use crate::error::validate_pairs;
@@ -16,48 +16,51 @@ mod tree;
 use judge::contradicted;
 use patch::{PairPatch, Pairs};
 
-/// So many pairs have one patch. More are cut, as its time grows with the third power.
+/// Up to this number, all pairs form one patch. More pairs are divided, because the time grows with
+/// the third power.
 const WHOLE: usize = 300;
 
-/// Pairs of the smallest patch. Twice as many halve the errors of smooth fields, and take four times
-/// as long.
+/// Number of pairs in the smallest patch. Twice as many halve the errors of smooth fields, and take
+/// four times as long.
 const fn smallest_patch(dimensions: usize) -> usize {
     if dimensions == 2 { 70 } else { 110 }
 }
 
-/// Places of a block, neighbours that are judged together.
+/// Number of points in a block of neighbours that are evaluated together.
 const BLOCK: usize = 24;
 
-/// Places of a block over pairs of its patch, at most: those in its middle.
+/// Maximum ratio of the points of a block to the pairs of its patch: only points in the middle are
+/// evaluated.
 const MIDDLE: usize = 3;
 
-/// Places of a block are so near to its middle, in distances to the farthest pair of its patch.
+/// Maximum distance of the block's points from its middle, relative to the farthest pair of its
+/// patch.
 const INSIDE: f64 = 0.8;
 
-/// Rounds in which wrong pairs are looked for: each judges without those of the last.
+/// Rounds of rejecting wrong pairs. Each round excludes those rejected in the last.
 const ROUNDS: usize = 4;
 
-/// Noise that is so many times the usual one may be deformation that the pairs do not resolve,
+/// Noise above this multiple of the typical one may be deformation that the pairs do not resolve,
 const FAR_ABOVE: f64 = 3.0;
 
-/// if it is at least this share of the spacing.
+/// if it is at least this fraction of the spacing.
 const NOTICEABLE: f64 = 0.02;
 
 /// A displacement field through pairs, with its gradient and their errors.
 ///
-/// The displacement is an affine field plus a Gaussian process (kriging), `cov zᵢ zⱼ = τ²(k(|xᵢ −
-/// xⱼ|) + λ δᵢⱼ)`. Shapes and lengths of k and noises λ are weighed by their restricted likelihood
-/// (Patterson & Thompson, Biometrika 58, 1971), and the field is the average of those that are
-/// likely. Its errors hold noise, what the pairs do not resolve, and what the likely processes do
-/// not agree on. They are raised where pairs, each left out in turn, lie farther from the prediction
-/// than the likelihood allows.
+/// The displacement is an affine field plus a Gaussian process (kriging),
+/// `cov zᵢ zⱼ = τ²(k(|xᵢ − xⱼ|) + λ δᵢⱼ)`. Shapes and lengths of k and noise ratios λ are weighted
+/// by their restricted likelihood (Patterson & Thompson, Biometrika 58, 1971), and the field is the
+/// average of the likely ones. Its errors include noise, unresolved detail, and the differences
+/// between the likely processes. They are increased if leave-one-out residuals are larger than the
+/// likelihood predicts.
 ///
-/// Up to 300 pairs are one patch. More are cut into patches of neighbours, which shrink to 70 pairs
-/// in the plane and 110 in space, in time and memory that grow as the number of pairs. Fewer than 16
-/// show an affine field. Directions that the points do not span have no gradient: its variance is
-/// infinite there.
+/// Up to 300 pairs form one patch. More pairs are divided into patches of neighbours, down to 70
+/// pairs in the plane and 110 in space, so that time and memory are proportional to the number of
+/// pairs. Fewer than 16 pairs determine only an affine field. The gradient is undetermined along
+/// directions that the points do not span: its variance is infinite there.
 ///
-/// A pair is left out if it contradicts its neighbours, and no three of them moved along: the
+/// A pair is rejected if it contradicts its neighbours, unless three of them share its motion: its
 /// distance from the prediction by the others exceeds six standard deviations and a seventh of the
 /// spacing.
 ///
@@ -87,11 +90,11 @@ const NOTICEABLE: f64 = 0.02;
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct LocalField<const D: usize> {
-    /// Whether a pair agrees with its neighbours.
+    /// Whether each pair agrees with its neighbours.
     pub kept: Vec<bool>,
-    /// The field at every source.
+    /// The field at each source.
     pub values: Vec<LocalValue<D>>,
-    /// Distance of every pair from what the others predict.
+    /// Distance of each pair from the prediction by the others.
     pub misses: Vec<f64>,
     /// Covariance of a row of the mean gradient over the sources.
     pub mean_gradient_covariance: SMatrix<f64, D, D>,
@@ -102,7 +105,7 @@ pub struct LocalField<const D: usize> {
     floor: f64,
     grain: f64,
     tree: Tree<D>,
-    /// The median of the values' noise.
+    /// Median noise of the values.
     usual: f64,
 }
 
@@ -117,23 +120,23 @@ pub struct LocalValue<const D: usize> {
     /// Gradient of the displacement: row i is ∇uᵢ.
     pub gradient: SMatrix<f64, D, D>,
     /// Covariance of a row of the gradient. Rows are independent of each other. Infinite along axes
-    /// that have a part across what the points span.
+    /// with a component normal to the span of the points.
     pub gradient_covariance: SMatrix<f64, D, D>,
-    /// Directions that the points hereabouts span: 1 for points on a line.
+    /// Number of directions that the nearby points span, such as 1 for points on a line.
     pub rank: usize,
-    /// Standard deviation of a coordinate's noise hereabouts.
+    /// Standard deviation of the local noise of a coordinate.
     pub sigma: f64,
-    /// By how much the pairs hereabouts, each left out in turn, lie farther from the prediction than
-    /// the likelihood allows: a ratio of variances, at least 1. The covariances hold it.
+    /// Ratio of the nearby leave-one-out residuals to the prediction of the likelihood, in terms of
+    /// variance and at least 1. The covariances include it.
     pub excess: f64,
-    /// Distance between neighbours hereabouts.
+    /// Local distance between neighbours.
     pub spacing: f64,
-    /// Whether the noise is far above that elsewhere: deformation that the pairs do not resolve, as
-    /// short waves and jumps. The errors hold it.
+    /// Whether the noise is far above that elsewhere: deformation that the pairs do not resolve,
+    /// such as short waves and jumps. The errors include it.
     pub unresolved: bool,
 }
 
-/// A value, and how far the pair there, if there is one, is from what the others predict.
+/// A value, and the leave-one-out misfit of the pair there, if there is one.
 #[derive(Clone, Copy)]
 struct Found<const D: usize> {
     value: LocalValue<D>,
@@ -145,22 +148,23 @@ struct Found<const D: usize> {
 }
 
 impl<const D: usize> LocalField<D> {
-    /// Pairs of a patch in a set of many.
+    /// Number of pairs in a patch of a large set.
     pub const PATCH: usize = smallest_patch(D);
 
-    /// Fits `sources` to `targets`. O(n³) time up to 300 pairs, O(n) beyond, after O(n log n) for
-    /// the neighbours.
+    /// Fits `sources` to `targets`. O(n³) time up to 300 pairs, and O(n) beyond, after O(n log n)
+    /// for the search of neighbours.
     ///
     /// # Errors
-    /// [`TpsError`] for no points, lengths that differ and numbers that are not finite.
+    /// [`TpsError`] for no points, lengths that differ and non-finite numbers.
     pub fn fit(sources: &[Point<f64, D>], targets: &[Point<f64, D>]) -> Result<Self, TpsError> {
         Self::fit_watched(sources, targets, |_| ControlFlow::Continue(()))
     }
 
-    /// As [`fit`](Self::fit). `watch` sees the points that are done, and may stop the fit.
+    /// Like [`fit`](Self::fit). `watch` is called with the number of completed points, and may stop
+    /// the fit.
     ///
     /// # Errors
-    /// As [`fit`](Self::fit), and [`TpsError::Stopped`].
+    /// Those of [`fit`](Self::fit), and [`TpsError::Stopped`].
     pub fn fit_watched(
         sources: &[Point<f64, D>],
         targets: &[Point<f64, D>],
@@ -201,7 +205,7 @@ impl<const D: usize> LocalField<D> {
         Ok(field)
     }
 
-    /// The field before it is fitted.
+    /// The field before the fit.
     fn of(sources: &[Point<f64, D>], targets: &[Point<f64, D>]) -> Result<Self, TpsError> {
         validate_pairs(sources, targets, None)?;
         let grain = grain::of_pairs(sources, targets);
@@ -220,7 +224,7 @@ impl<const D: usize> LocalField<D> {
         })
     }
 
-    /// The covariance of the mean gradient.
+    /// Computes the covariance of the mean gradient.
     fn take_mean(&mut self, patch: &mut PairPatch<D>) {
         let (size, kept) = (self.sizes().0, self.tree.len());
         if kept == size {
@@ -228,8 +232,8 @@ impl<const D: usize> LocalField<D> {
             self.degrees_of_freedom = patch.degrees();
             return;
         }
-        // Points of one patch share their errors. Those of neighbouring patches cancel in part, so
-        // that this is at least the error of the mean.
+        // Points of one patch share their errors. Those of neighbouring patches partly cancel, so
+        // this is an upper bound of the error of the mean.
         let patches = kept / size;
         let all = self.values.iter().map(|value| value.gradient_covariance);
         let mean = all.sum::<SMatrix<f64, D, D>>() / self.values.len() as f64;
@@ -246,13 +250,13 @@ impl<const D: usize> LocalField<D> {
         }
     }
 
-    /// The tree of the pairs that are kept.
+    /// Builds the tree of the kept pairs.
     fn plant(&mut self) {
         let rows = (0..self.sources.len()).filter(|&i| self.kept[i]);
         self.tree = Tree::new(&self.sources, rows.collect(), BLOCK);
     }
 
-    /// Marks values whose noise is far above the usual one.
+    /// Marks values whose noise is far above the typical one.
     fn mark(&mut self) {
         let mut noises: Vec<f64> = self.values.iter().map(LocalValue::noise).collect();
         let middle = noises.len() / 2;
@@ -263,11 +267,11 @@ impl<const D: usize> LocalField<D> {
         self.values.iter_mut().for_each(|value| value.mark(usual));
     }
 
-    /// The field at any points: O(1) time for each that has neighbours among them.
+    /// The field at any points: O(1) time for each point with nearby pairs.
     #[must_use]
     pub fn at(&self, points: &[Point<f64, D>]) -> Vec<LocalValue<D>> {
         let mut found = Vec::with_capacity(points.len());
-        // Nothing stops this walk.
+        // Nothing stops this evaluation.
         let mut patch = PairPatch::default();
         let _ = self.walk(&mut patch, points, false, &mut found, |_| {
             ControlFlow::Continue(())
@@ -280,19 +284,19 @@ impl<const D: usize> LocalField<D> {
         found.into_iter().map(value).collect()
     }
 
-    /// Pairs of a patch, and places that it serves.
+    /// Number of pairs in a patch, and number of points that it serves.
     fn sizes(&self) -> (usize, usize) {
         let kept = self.tree.len();
         if kept <= WHOLE {
             return (kept, usize::MAX);
         }
-        // As much time for each pair, until patches are as small as they may be.
+        // The time per pair is kept constant until the smallest patch size is reached.
         let size = WHOLE as f64 * (WHOLE as f64 / kept as f64).sqrt();
         let size = (size as usize).max(Self::PATCH);
         (size, size.div_euclid(MIDDLE))
     }
 
-    /// The field at `points`, which are the sources if they are judged.
+    /// The field at `points`, which must be the sources if pairs are judged.
     fn walk(
         &self,
         patch: &mut PairPatch<D>,
@@ -303,7 +307,7 @@ impl<const D: usize> LocalField<D> {
     ) -> Result<(), TpsError> {
         let (count, leaf) = self.sizes();
         let pairs = self.pairs();
-        // One patch serves all points of a block, which are neighbours.
+        // One patch serves all points of a block, because they are neighbours.
         let blocks = Tree::new(points, (0..points.len()).collect(), leaf);
         patch.forget_last();
         let (mut order, mut own, mut values) = (Vec::new(), Vec::new(), Vec::new());
@@ -352,7 +356,7 @@ impl<const D: usize> LocalField<D> {
                     patch.take(&pairs, near.into_iter().map(|near| near.1));
                     read(patch, &block);
                 } else {
-                    // Sparse points beside dense pairs: smaller blocks have patches of their own.
+                    // For sparse points next to dense pairs, smaller blocks get their own patches.
                     let axis = extents.imax();
                     let along = |&i: &usize| points[i][axis];
                     block.sort_unstable_by(|i, j| along(i).total_cmp(&along(j)).then(i.cmp(j)));
@@ -372,12 +376,12 @@ impl<const D: usize> LocalField<D> {
 }
 
 impl<const D: usize> LocalValue<D> {
-    /// What the pairs hereabouts have of noise, and of what the likelihood does not allow.
+    /// Local noise of the pairs, increased by the excess over the likelihood.
     fn noise(&self) -> f64 {
         self.sigma * self.excess.sqrt()
     }
 
-    /// Noise far above the usual one may be deformation between the pairs: its gradient is of the
+    /// Noise far above the typical one may be deformation between the pairs: its gradient is of the
     /// order of the noise over half of the spacing.
     fn mark(&mut self, usual: f64) {
         let noise = self.noise();
@@ -389,7 +393,7 @@ impl<const D: usize> LocalValue<D> {
     }
 }
 
-/// Rows of the `count` points nearest to each place, nearest first. O(log n) for each place.
+/// Rows of the `count` points nearest to each position, nearest first. O(log n) per position.
 ///
 /// ```
 /// use nalgebra::Point2;

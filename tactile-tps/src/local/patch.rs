@@ -5,7 +5,8 @@ use super::{Matrix4x3, Point, RowVector4, SMatrix, SVector};
 
 mod evaluate;
 
-/// Covariances that are tried, each family from long to short, lengths in radii of the patch.
+/// Covariances that are tried, from long to short in each family, with lengths in radii of the
+/// patch.
 const SHAPES: [Shape; 11] = [
     Shape::Affine,
     Shape::Gaussian(4.0),
@@ -20,33 +21,34 @@ const SHAPES: [Shape; 11] = [
     Shape::Matern3(1.0),
 ];
 
-/// A shape that is so much less likely than the best ends its family, if it is no better than the
-/// one before: in natural logarithms.
+/// A shape whose log-likelihood is this far below the best ends its family, if it is no better than
+/// the previous one.
 const HOPELESS: f64 = 12.0;
 
-/// Shorter lengths, in spacings, resolve nothing that the pairs show.
+/// Shorter lengths, in spacings, resolve nothing that the pairs contain.
 const SHORTEST: f64 = 1.2;
 
-/// λ = 4ᵏ, from the rounding of the covariances to fields that hardly differ from affine ones.
+/// λ = 4ᵏ, from the rounding of the covariances to fields that are almost affine.
 const POWERS: std::ops::RangeInclusive<i32> = -19..=2;
 
-/// Fewer pairs show an affine field and its error.
+/// Minimum number of pairs for a process. Fewer determine only an affine field with its error.
 const FEWEST: usize = 16;
 
-/// Processes whose likelihood is a smaller share of the largest take no part.
+/// Processes with a likelihood below this fraction of the largest are excluded.
 const LEAST_SHARE: f64 = 0.02;
 
-/// Processes that take part, at most.
+/// Maximum number of processes in the average.
 const MOST: usize = 6;
 
-/// Every other one of so many pairs finds the shapes and noises to begin with.
+/// From this number of pairs on, shapes and noises are first determined with every other pair.
 const MANY: usize = 100;
 
-/// Every so many patches all shapes are tried, in the others those that took part in the last.
+/// All shapes are tried in one of this number of patches; in the others, only those used in the
+/// last.
 const ROUND: usize = 4;
 
-/// Extents across which points are taken to lie in a line or a plane: the rounding of coordinates,
-/// in the largest extent.
+/// Relative extent, from rounding of coordinates, below which points count as lying on a line or a
+/// plane.
 const FLAT: f64 = 1e-6;
 
 /// Pairs of a field.
@@ -54,7 +56,7 @@ const FLAT: f64 = 1e-6;
 pub(super) struct Pairs<'a, const D: usize> {
     pub(super) sources: &'a [Point<f64, D>],
     pub(super) displacements: &'a [SVector<f64, D>],
-    /// The least standard deviation of a coordinate, and the grain of the numbers.
+    /// The minimum standard deviation of a coordinate, and the grain of the numbers.
     pub(super) floor: f64,
     pub(super) grain: f64,
 }
@@ -66,23 +68,23 @@ pub(super) struct PairPatch<const D: usize> {
     radius: f64,
     spacing: f64,
     grain: f64,
-    /// Orthonormal directions, those that the points span first.
+    /// Orthonormal directions, with those that the points span first.
     frame: SMatrix<f64, D, D>,
     data: Data<D>,
-    /// The affine field of least squares, in the frame.
+    /// The least-squares affine field, in the frame.
     trend: Matrix4x3<f64>,
     factor: Factor,
     processes: Vec<Process<D>>,
     seen: usize,
-    /// Those that take part, with their shares, the likeliest first.
+    /// The processes in the average with their weights, the likeliest first.
     mixture: Vec<(usize, f64)>,
-    /// The process whose factor was made last.
+    /// The process whose factor was computed last.
     factored: usize,
     taken: usize,
-    /// The λ and the share of every shape in the last patch.
+    /// The λ and the weight of each shape in the last patch.
     last: [i32; SHAPES.len()],
     share: [f64; SHAPES.len()],
-    /// Bᵢᵢ, and squared left-out residuals over their variances along each axis.
+    /// Bᵢᵢ, and squared leave-one-out residuals over their variances along each axis.
     precisions: Vec<f64>,
     misfits: Vec<SVector<f64, D>>,
     columns: Vec<f64>,
@@ -123,7 +125,7 @@ impl<const D: usize> Default for PairPatch<D> {
 }
 
 impl<const D: usize> PairPatch<D> {
-    /// Takes pairs, and finds the processes that are likely.
+    /// Stores pairs, and finds the likely processes.
     pub(super) fn take(&mut self, pairs: &Pairs<'_, D>, rows: impl Iterator<Item = usize>) {
         self.rows.clear();
         self.rows.extend(rows);
@@ -171,7 +173,7 @@ impl<const D: usize> PairPatch<D> {
         });
         let eigen = scatter.symmetric_eigen();
         let mut order: [usize; 3] = [0, 1, 2];
-        // In the plane the third axis has no extent: its vector comes last.
+        // In the plane the third axis has no extent, so its vector comes last.
         order.sort_unstable_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
         let largest = eigen.eigenvalues[order[0]];
         data.rank = 0;
@@ -188,7 +190,7 @@ impl<const D: usize> PairPatch<D> {
             data.rank = 0;
         }
         let rank = data.rank as i32;
-        // As many points in a ball of that many dimensions.
+        // Spacing of this number of points in a ball with this number of dimensions.
         let ball = [
             1.0,
             2.0,
@@ -203,7 +205,7 @@ impl<const D: usize> PairPatch<D> {
         }
     }
 
-    /// Affine functions at a place, of the directions that the points span.
+    /// Affine functions at a position, for the directions that the points span.
     fn basis(&self, place: &SVector<f64, D>) -> RowVector4<f64> {
         RowVector4::from_fn(|_, c| match c {
             0 => 1.0,
@@ -220,8 +222,8 @@ impl<const D: usize> PairPatch<D> {
         })
     }
 
-    /// Takes the affine field of least squares away, which likelihoods do not depend on: residuals
-    /// of exact fields are rounded to their own size.
+    /// Subtracts the least-squares affine field, on which likelihoods do not depend, so that the
+    /// residuals of exact fields are rounded at their own size.
     fn detrend(&mut self) {
         let data = &mut self.data;
         self.trend = Matrix4x3::zeros();
@@ -234,7 +236,7 @@ impl<const D: usize> PairPatch<D> {
         let Some(root) = normal.cholesky() else {
             return;
         };
-        // The second pass takes what rounding left of the first.
+        // The second pass removes the rounding errors of the first.
         for _ in 0..2 {
             let mut moments = Matrix4x3::zeros();
             for (basis, z) in data.bases.iter().zip(&data.displacements) {
@@ -249,7 +251,7 @@ impl<const D: usize> PairPatch<D> {
         }
     }
 
-    /// Finds the processes that take part. Leaves the factor of the likeliest.
+    /// Finds the processes of the average. Leaves the factor of the likeliest.
     fn search(&mut self) {
         self.seen = 0;
         self.mixture.clear();
@@ -302,15 +304,15 @@ impl<const D: usize> PairPatch<D> {
                 self.share[s] = if all { self.share[s] + share } else { 1.0 };
             }
         }
-        // Others may have been weighed last.
+        // Another process may have been evaluated last.
         self.factored = usize::MAX;
         if let Some(&(best, _)) = self.mixture.first() {
             self.refactor(best);
         }
     }
 
-    /// The least energy of a shape, from the λ of the last patch, or of the last shape of its
-    /// family. Keeps the processes on the way that are about as likely as the likeliest.
+    /// The lowest energy of a shape, starting from the λ of the last patch or of the previous shape
+    /// in its family. Keeps the processes on the way that are nearly as likely as the likeliest.
     fn climb(&mut self, s: usize, first: bool, least: &mut f64) -> f64 {
         self.factor.cover(&self.data.points, SHAPES[s]);
         if SHAPES[s] == Shape::Affine {
@@ -319,7 +321,7 @@ impl<const D: usize> PairPatch<D> {
         let new = self.taken == 0;
         let mut at = self.last[if new && !first { s - 1 } else { s }];
         let mut energy = self.look(s, at, least);
-        // Large steps for the first shape of the first patch. Others start close to their λ.
+        // The first shape of the first patch uses large steps. Others start close to their λ.
         let steps = if new && first {
             &[-4, 4, -1, 1][..]
         } else {
@@ -338,7 +340,7 @@ impl<const D: usize> PairPatch<D> {
                 }
                 (at, energy) = (next, other);
             }
-            // It gets worse towards where it came from.
+            // The energy rises back towards the start.
             if at != start && *step == -1 {
                 break;
             }
@@ -364,7 +366,7 @@ impl<const D: usize> PairPatch<D> {
         energy
     }
 
-    /// Compares every pair with what the others predict.
+    /// Compares each pair with the prediction by the others.
     fn calibrate(&mut self) {
         self.misfits.clear();
         let Some(&(best, _)) = self.mixture.first() else {
@@ -387,13 +389,13 @@ impl<const D: usize> PairPatch<D> {
         self.data.degrees()
     }
 
-    /// Lets the next patch be found as the first.
+    /// Resets the search, so that the next patch is treated like the first.
     pub(super) fn forget_last(&mut self) {
         self.taken = 0;
         self.last = [-7; SHAPES.len()];
     }
 
-    /// Gradient of the affine field of least squares.
+    /// Gradient of the least-squares affine field.
     pub(super) fn trend(&self) -> SMatrix<f64, D, D> {
         SMatrix::from_fn(|d, a| (self.slope(a) * self.trend.column(d))[0] / self.radius)
     }
@@ -403,7 +405,8 @@ impl<const D: usize> PairPatch<D> {
         self.rows.iter().position(|&row| row == source)
     }
 
-    /// Squared distance of a pair from what the others predict over its variance, and the distance.
+    /// Squared distance of a pair from the prediction by the others over its variance, and the
+    /// distance.
     pub(super) fn left_out(&self, row: usize) -> (f64, f64) {
         let squares = self.misfits[row];
         let Some(&(best, _)) = self.mixture.first() else {

@@ -1,4 +1,4 @@
-//! Gaussian processes beside affine fields, and how likely they are.
+//! Gaussian processes in addition to affine fields, and their likelihoods.
 
 use super::{Matrix4, Matrix4x3, RowVector4, SVector};
 use core::mem::MaybeUninit;
@@ -8,16 +8,16 @@ use faer::{
     linalg::{cholesky::llt, triangular_inverse, triangular_solve},
 };
 
-// With `C = K + λ 1`, the affine functions P and the displacements Z the restricted likelihood is
+// With `C = K + λ 1`, the affine functions P and the displacements Z, the restricted likelihood is
 //
 // `−ln p = ½ [M ln τ² + S/τ² + D (ln det C + ln det PᵀC⁻¹P)]`, `S = tr ZᵀBZ`,
 // `M = D (n − rank − 1)`, `B = C⁻¹ − C⁻¹P (PᵀC⁻¹P)⁻¹ PᵀC⁻¹`.
 //
-// It is greatest at `τ² = S/M`, or where the noise is that of the grain of the numbers. What the
-// others predict for pair i is off by `(BZ)ᵢ/Bᵢᵢ`, whose variance is `τ²/Bᵢᵢ`.
+// It is largest at `τ² = S/M`, or where the noise equals that of the grain of the numbers. The
+// leave-one-out residual of pair i is `(BZ)ᵢ/Bᵢᵢ`, with the variance `τ²/Bᵢᵢ`.
 
-/// Covariances by distance: none beside affine fields, Gaussian ones for fields that are smooth
-/// over some spacings, and Matérn's of two derivatives and of one for those that are not.
+/// Covariances by distance: none for affine fields, Gaussian for fields that are smooth over
+/// several spacings, and Matérn with two derivatives or one for rougher fields.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Shape {
     Affine,
@@ -27,7 +27,7 @@ pub(super) enum Shape {
 }
 
 impl Shape {
-    /// k(r) and k'(r)/r, which at r = 0 is k''(0).
+    /// k(r) and k'(r)/r, which is k''(0) at r = 0.
     #[inline(always)]
     pub(super) fn of(self, square: f64) -> (f64, f64) {
         match self {
@@ -53,11 +53,11 @@ impl Shape {
         }
     }
 
-    /// Derivative of k'(r)/r over r, of which the covariance of gradients is made:
+    /// Derivative of k'(r)/r over r, from which the covariance of gradients follows:
     /// `cov ∂ₐf(x) ∂ᵦf(y) = −δₐᵦ k'/r − dₐ dᵦ (k'/r)'/r` with `d = x − y`.
     ///
-    /// Of Matérn's of one derivative it is infinite at r = 0, and its product with d dᵀ zero: the
-    /// value there is zero.
+    /// For Matérn with one derivative it is infinite at r = 0, where its product with d dᵀ
+    /// vanishes: the value there is zero.
     pub(super) fn bend(self, square: f64) -> f64 {
         match self {
             Self::Affine => 0.0,
@@ -79,7 +79,7 @@ impl Shape {
     }
 }
 
-/// Pairs as a process takes them.
+/// Pairs in the form that a process uses.
 #[derive(Clone, Debug)]
 pub(super) struct Data<const D: usize> {
     pub(super) points: Vec<SVector<f64, D>>,
@@ -88,7 +88,7 @@ pub(super) struct Data<const D: usize> {
     pub(super) displacements: Vec<SVector<f64, D>>,
     /// Directions that the points span.
     pub(super) rank: usize,
-    /// The least variance of a coordinate's noise.
+    /// The minimum noise variance of a coordinate.
     pub(super) floor: f64,
 }
 
@@ -99,12 +99,12 @@ impl<const D: usize> Data<D> {
     }
 }
 
-/// A process through the pairs: covariance, noise, and the mean's coefficients.
+/// A process through the pairs: covariance, noise and coefficients of the mean.
 #[derive(Clone, Debug)]
 pub(super) struct Process<const D: usize> {
     pub(super) shape: Shape,
     pub(super) lambda: f64,
-    /// Minus the logarithm of the restricted likelihood.
+    /// Negative logarithm of the restricted likelihood.
     pub(super) energy: f64,
     /// τ².
     pub(super) scale: f64,
@@ -126,11 +126,11 @@ impl<const D: usize> Default for Process<D> {
     }
 }
 
-/// The factor of a process, and memory for the next.
+/// The factor of a process, with reusable memory.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Factor {
     n: usize,
-    /// K, the lower triangle by columns.
+    /// K, as lower triangle by columns.
     kernel: Vec<f64>,
     /// L of `C = LLᵀ`.
     lower: Vec<f64>,
@@ -142,7 +142,7 @@ pub(super) struct Factor {
     stack: Vec<MaybeUninit<u8>>,
 }
 
-/// Memory for a step of a factorisation.
+/// Working memory for a step of a factorisation.
 fn memory(kept: &mut Vec<MaybeUninit<u8>>, size: StackReq) -> &mut MemStack {
     let bytes = size.unaligned_bytes_required();
     if kept.len() < bytes {
@@ -156,7 +156,7 @@ impl Factor {
         MatRef::from_column_major_slice(data, self.n, self.n)
     }
 
-    /// Fills the covariances of a shape.
+    /// Computes the covariances of a shape.
     pub(super) fn cover<const D: usize>(&mut self, points: &[SVector<f64, D>], shape: Shape) {
         let n = points.len();
         self.n = n;
@@ -168,8 +168,8 @@ impl Factor {
         }
     }
 
-    /// Scale, energy and affine part of the process with the covariances that were filled in.
-    /// Leaves its factor.
+    /// Computes scale, energy and affine part of the process with the stored covariances. Leaves
+    /// its factor.
     pub(super) fn weigh<const D: usize>(&mut self, data: &Data<D>, process: &mut Process<D>) {
         let n = self.n;
         process.energy = f64::INFINITY;
@@ -216,7 +216,7 @@ impl Factor {
             return;
         };
         self.normal = root.inverse();
-        // Of the directions that are not spanned nothing is used.
+        // Directions that are not spanned are not used.
         for a in terms..4 {
             self.normal[(a, a)] = 0.0;
         }
@@ -230,7 +230,7 @@ impl Factor {
             + D as f64 * (log_det + log_normal);
     }
 
-    /// BZ of the process that was weighed last.
+    /// BZ of the process evaluated last.
     pub(super) fn solve<const D: usize>(&mut self, data: &Data<D>, process: &mut Process<D>) {
         let (n, terms) = (self.n, data.rank + 1);
         let (bases, rest) = self.white.split_at_mut(terms * n);
@@ -255,7 +255,7 @@ impl Factor {
         process.weights.extend((0..n).map(weight));
     }
 
-    /// L⁻¹ of columns.
+    /// Multiplies columns by L⁻¹.
     pub(super) fn whiten(&self, columns: &mut [f64]) {
         let count = columns.len() / self.n.max(1);
         triangular_solve::solve_lower_triangular_in_place(
@@ -265,7 +265,8 @@ impl Factor {
         );
     }
 
-    /// What the pairs do not explain of the affine functions `basis`, if `column` is whitened.
+    /// Part of the affine functions `basis` that the pairs do not explain. `column` must be
+    /// whitened.
     pub(super) fn unexplained(
         &self,
         basis: RowVector4<f64>,
@@ -279,7 +280,7 @@ impl Factor {
         basis
     }
 
-    /// The covariance that the coefficients of the affine functions add.
+    /// The covariance contributed by the coefficients of the affine functions.
     pub(super) fn of_affine(&self, a: &RowVector4<f64>, b: &RowVector4<f64>) -> f64 {
         (a * self.normal * b.transpose())[0]
     }

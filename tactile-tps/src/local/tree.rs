@@ -1,27 +1,26 @@
-//! A k-d tree: blocks of neighbours, and the nearest of some points.
+//! A k-d tree: blocks of neighbours, and nearest-neighbour search.
 
 use nalgebra::Point;
 
-/// Rows of points in the order of the tree, and where its inner nodes cut.
+/// Rows of points in the order of the tree, with the cuts of its inner nodes.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tree<const D: usize> {
     order: Vec<usize>,
-    /// Points of a leaf at most.
+    /// Maximum number of points in a leaf.
     leaf: usize,
-    /// Axis and coordinate of the cut, as a heap. The halves of a range have its middle between
-    /// them.
+    /// Axis and coordinate of each cut, as a heap. A range is cut at its middle.
     cuts: Vec<(usize, f64)>,
 }
 
 impl<const D: usize> Tree<D> {
-    /// The tree of some rows of `points`, with leaves of at most so many.
+    /// Builds the tree of some rows of `points`, with at most `leaf` points per leaf.
     pub(super) fn new(points: &[Point<f64, D>], mut order: Vec<usize>, leaf: usize) -> Self {
         let mut cuts = Vec::new();
         split(points, &mut order, leaf, 0, &mut cuts);
         Self { order, leaf, cuts }
     }
 
-    /// The rows, neighbours after each other.
+    /// The rows, with neighbours next to each other.
     pub(super) fn rows(&self) -> &[usize] {
         &self.order
     }
@@ -30,7 +29,7 @@ impl<const D: usize> Tree<D> {
         self.order.len()
     }
 
-    /// The leaves, neighbours after each other.
+    /// The leaves, with neighbours next to each other.
     pub(super) fn leaves(&self) -> Vec<&[usize]> {
         let mut leaves = Vec::new();
         let mut open = vec![&self.order[..]];
@@ -39,7 +38,7 @@ impl<const D: usize> Tree<D> {
                 leaves.push(rows);
             } else {
                 let (low, high) = rows.split_at(rows.len() / 2);
-                // The low half is taken from the stack first, so that leaves follow the order of
+                // The lower half is popped from the stack first, so that leaves follow the order of
                 // the tree.
                 open.extend([high, low]);
             }
@@ -47,7 +46,7 @@ impl<const D: usize> Tree<D> {
         leaves
     }
 
-    /// Squared distances and rows of the `count` points nearest to a place, nearest first.
+    /// Squared distances and rows of the `count` points nearest to a position, nearest first.
     pub(super) fn nearest(
         &self,
         points: &[Point<f64, D>],
@@ -82,7 +81,7 @@ impl<const D: usize> Tree<D> {
             let rows = self.order[range].iter();
             let distances = rows.map(|&i| ((points[i] - place).norm_squared(), i));
             found.extend(distances.filter(|near| near.0 <= *limit));
-            // Pruned now and then: in all O(1) for each point looked at.
+            // Pruned occasionally: O(1) per examined point on average.
             if found.len() > 2 * count {
                 found.select_nth_unstable_by(count, by_distance);
                 found.truncate(count);
@@ -95,7 +94,8 @@ impl<const D: usize> Tree<D> {
         let low = (2 * node + 1, range.start..middle);
         let high = (2 * node + 2, middle..range.end);
         let beyond = place[axis] - cut;
-        // The half that holds the place first: it narrows the limit for the other.
+        // The half that contains the position comes first, because it narrows the limit for the
+        // other.
         let (first, second) = if beyond < 0.0 {
             (low, high)
         } else {
@@ -108,7 +108,7 @@ impl<const D: usize> Tree<D> {
     }
 }
 
-/// Orders rows by halves, and notes where they were cut.
+/// Orders rows by halving, and records the cuts.
 fn split<const D: usize>(
     points: &[Point<f64, D>],
     rows: &mut [usize],
@@ -127,7 +127,7 @@ fn split<const D: usize>(
         let (low, high) = rows.iter().fold((f64::MAX, f64::MIN), range);
         high - low
     };
-    // Cut across the longest axis: blocks stay compact, and searches end early.
+    // Cutting across the longest axis keeps blocks compact and ends searches early.
     let axis = (1..D).fold(0, |best, a| if extent(a) > extent(best) { a } else { best });
     let middle = rows.len() / 2;
     let by_place =

@@ -1,31 +1,31 @@
-//! The field and its errors at places of a patch.
+//! The field and its errors at points of a patch.
 
 use super::super::process::Shape;
 use super::super::{LocalValue, Point, RowVector4, SMatrix, SVector};
 use super::{FLAT, PairPatch};
 
-/// Processes whose errors are averaged, at most.
+/// Maximum number of processes whose errors are averaged.
 const HEARD: usize = 3;
 
-/// Smaller shares are not, but for that of the likeliest.
+/// Minimum weight of such a process, except for the likeliest.
 const LEAST_HEARD: f64 = 0.1;
 
-/// Pairs about a place whose residuals calibrate the errors there.
+/// Effective number of nearby pairs whose residuals calibrate the local errors.
 const NEARBY: f64 = 12.0;
 
-/// Places that are evaluated together.
+/// Number of points evaluated together.
 const TOGETHER: usize = 24;
 
 impl<const D: usize> PairPatch<D> {
-    /// By how much the variances are raised at a place: squared residuals of the pairs thereabouts,
-    /// each left out in turn, over their variances, along the axis that has most.
+    /// Factor by which the variances are increased at a point: squared leave-one-out residuals of
+    /// the nearby pairs over their variances, along the axis with the largest ratio.
     ///
-    /// The likelihood's τ² is the mean of the patch under its covariance. A field that is steeper
-    /// in a part of it, or of another shape, is further from its pairs there than the covariance
-    /// allows (Bachoc, Comput. Stat. Data Anal. 66, 2013).
+    /// The τ² of the likelihood is the mean over the patch under its covariance. If a field is
+    /// steeper in a part of the patch, or has another shape, its pairs there deviate more than the
+    /// covariance predicts (Bachoc, Comput. Stat. Data Anal. 66, 2013).
     fn raised(&self, place: &SVector<f64, D>) -> f64 {
         let n = self.rows.len() as f64;
-        // Radius of weights whose effective number is that of the nearby pairs.
+        // Radius of weights whose effective number equals that of the nearby pairs.
         let reach = match D {
             2 => NEARBY / (4.0 * n),
             _ => (NEARBY / (10.6 * n)).powf(2.0 / 3.0),
@@ -43,7 +43,7 @@ impl<const D: usize> PairPatch<D> {
             sum += misfit * weight;
             total += weight;
         }
-        // Only raised: few residuals that happen to be small do not prove small errors.
+        // Only increased: a few residuals that are small by chance do not prove small errors.
         let found: f64 = (sum / total).max();
         if found.is_finite() {
             found.max(1.0)
@@ -52,7 +52,7 @@ impl<const D: usize> PairPatch<D> {
         }
     }
 
-    /// Displacement and gradient of a process at a place, and those of the trend.
+    /// Displacement and gradient of a process at a point, and those of the trend.
     fn mean(&self, process: usize, x: &SVector<f64, D>) -> (SVector<f64, D>, SMatrix<f64, D, D>) {
         let process = &self.processes[process];
         let affine = self.trend + process.affine;
@@ -74,7 +74,7 @@ impl<const D: usize> PairPatch<D> {
         (displacement, gradient / self.radius)
     }
 
-    /// The field at some places: O(n²) for each.
+    /// The field at several points: O(n²) for each.
     pub(in super::super) fn values(
         &mut self,
         places: &[Point<f64, D>],
@@ -103,7 +103,7 @@ impl<const D: usize> PairPatch<D> {
                 spacing: self.spacing,
                 unresolved: false,
             };
-            // What the likely processes do not agree on.
+            // Variance between the likely processes.
             for &(share, (u, h)) in &means {
                 let off = h - gradient;
                 value.displacement_variance += share * (u - displacement).norm_squared() / D as f64;
@@ -122,8 +122,8 @@ impl<const D: usize> PairPatch<D> {
                 self.add_errors(k, share / heard, places, values);
             }
         }
-        // Rounded numbers stand still over many spacings and then jump: their errors do not average
-        // out within a patch.
+        // Rounded numbers are constant over many spacings and then jump, so their errors do not
+        // average out within a patch.
         let steps = (0.5 * self.grain / self.radius).powi(2);
         for (place, value) in places.iter().zip(found) {
             let x = self.inside(place);
@@ -137,7 +137,7 @@ impl<const D: usize> PairPatch<D> {
         (place.coords - self.centre) / self.radius
     }
 
-    /// Makes the factor that of a process.
+    /// Computes the factor of a process.
     pub(super) fn refactor(&mut self, k: usize) {
         if self.factored != k {
             let process = &mut self.processes[k];
@@ -147,7 +147,7 @@ impl<const D: usize> PairPatch<D> {
         }
     }
 
-    /// Adds the errors of a process, of which `share` is the share.
+    /// Adds the errors of a process with the weight `share`.
     fn add_errors(
         &mut self,
         k: usize,
@@ -210,8 +210,8 @@ impl<const D: usize> PairPatch<D> {
         self.columns = columns;
     }
 
-    /// Covariance of a row of the mean gradient over the points. The errors of one patch hang
-    /// together.
+    /// Covariance of a row of the mean gradient over the points. The errors within a patch are
+    /// correlated.
     pub(in super::super) fn of_mean(&mut self) -> SMatrix<f64, D, D> {
         let n = self.rows.len();
         let Some(&(best, _)) = self.mixture.first() else {
@@ -254,7 +254,7 @@ impl<const D: usize> PairPatch<D> {
         covariance
     }
 
-    /// Nothing is known along directions that the points do not span.
+    /// Sets infinite variances along directions that the points do not span.
     fn forget(&self, x: &SVector<f64, D>, variance: &mut f64, covariance: &mut SMatrix<f64, D, D>) {
         let rank = self.data.rank;
         if self.data.degrees() == 0 {
@@ -275,7 +275,7 @@ impl<const D: usize> PairPatch<D> {
         }
     }
 
-    /// The field of no pairs.
+    /// The field without pairs.
     fn unknown(&self) -> LocalValue<D> {
         LocalValue {
             displacement: SVector::zeros(),
@@ -301,8 +301,8 @@ fn average<const D: usize>(means: impl Iterator<Item = (f64, Mean<D>)>) -> Mean<
     )
 }
 
-/// Variance over that of a Gaussian whose 95 % interval is as wide as that of Student's law, by the
-/// expansion of Cornish and Fisher: 4 % less at two degrees, nothing from ten on.
+/// Variance ratio of a Gaussian whose 95 % interval is as wide as that of Student's distribution,
+/// by the Cornish–Fisher expansion: 4 % too small at two degrees of freedom, accurate from ten on.
 fn student(degrees: usize) -> f64 {
     let v = (degrees.max(1)) as f64;
     let quantile = 1.96 + 2.372 / v + 2.823 / (v * v) + 2.556 / (v * v * v);
@@ -310,7 +310,7 @@ fn student(degrees: usize) -> f64 {
 }
 
 impl<const D: usize> LocalValue<D> {
-    /// As [`PairPatch::left_out`], of a pair that is not in the patch.
+    /// Like [`PairPatch::left_out`], for a pair outside the patch.
     pub(in super::super) fn beside(&self, displacement: &SVector<f64, D>) -> (f64, f64) {
         let distance = (displacement - self.displacement).norm();
         let variance = self.displacement_variance + self.sigma * self.sigma;
