@@ -1,25 +1,20 @@
-//! Contact: the points of a surface at which gaps are measured, and the forces that keep them from
-//! closing.
+//! Contact: the points of a surface at which gaps are measured, and the forces that prevent
+//! penetration.
 //!
 //! Gaps g are averaged over the hat functions φ of the first surface's nodes (linear on each half
-//! of an edge): $g_v = \int \varphi_v g / \int \varphi_v$. The pressure per reference area is $t =
-//! \sum_v \varphi_v t_v$ with $t_v = \langle \lambda_v - \varepsilon g_v \rangle$: one pressure for
-//! each node's displacement, a stable pair (pressures linear on each edge, but not continuous,
-//! oscillate). It derives from a potential, so that the tangent is symmetric. λ is updated to t
-//! between equilibria (augmented Lagrangian, Uzawa).
+//! of an edge): $g_v = \int \varphi_v g / \int \varphi_v$. The pressure per reference area is
+//! $t = \sum_v \varphi_v t_v$ with $t_v = \langle \lambda_v - \varepsilon g_v \rangle$. One
+//! pressure per nodal displacement is a stable pair, whereas discontinuous pressures that are
+//! linear on each edge oscillate. The pressure derives from a potential, so the tangent is
+//! symmetric. λ is set to t between equilibria (augmented Lagrangian, Uzawa).
 //!
-//! Opposite a deformable surface the integrals are taken piece by piece between the ends of the
-//! other surface's edges (segment-to-segment). Its normal jumps there: points fixed on the first
-//! surface would carry their whole force from one side of the kink to the other at once, and
-//! Newton's method would cycle. Pieces that grow and shrink carry it over continuously.
+//! Opposite a deformable surface, the integrals are computed piecewise between the ends of the
+//! other surface's edges (segment-to-segment), because its normal jumps there. Points fixed on the
+//! first surface would transfer their whole force across the kink at once, and Newton's method
+//! would cycle. Pieces that grow and shrink transfer it continuously.
 //!
-//! A surface's edges in order, for the search of closest points.
-//!
-//! Where the nodes are: reference coordinates and displacements.
-//!
-//! Gaps between a point of a surface and what lies opposite, with their derivatives.
-//!
-//! Contact nodes that touch, or may do so within a load step.
+//! The module also contains the search of closest points on a surface's edges, the gaps with their
+//! derivatives, and the selection of contact nodes that touch or may touch within a load step.
 
 use crate::element::quadratic;
 use crate::material::Kinematics;
@@ -29,13 +24,14 @@ use crate::surface::{
     combine,
 };
 
-/// Two ends of edges nearer than this part of a segment leave nothing to integrate between them.
+/// Minimum distance of two cuts, relative to a segment. Closer ends of edges leave nothing to
+/// integrate between them.
 const SLIVER: f64 = 1e-6;
 
-/// Part of a node's area that has something opposite to it, below which the node is open.
+/// Minimum fraction of a node's area with something opposite to it. Below, the node is open.
 const LEAST_SHARE: f64 = 0.25;
 
-/// Where contact is judged: reference coordinates and displacements.
+/// Geometry for the contact evaluation: reference coordinates and displacements.
 #[derive(Clone, Copy)]
 pub(crate) struct Placement<'a> {
     pub kinematics: Kinematics,
@@ -45,7 +41,7 @@ pub(crate) struct Placement<'a> {
 }
 
 impl Placement<'_> {
-    /// Parameters on a segment at which the ends of the opposite edges lie closest.
+    /// Parameters on a segment that are closest to the ends of the opposite edges.
     fn cuts(&self, segment: &ContactSegment, curve: &SurfaceCurve) -> Vec<f64> {
         let at = |parameter: f64| {
             let (shape, derivative) = quadratic(parameter);
@@ -66,12 +62,12 @@ impl Placement<'_> {
             let offset = [corner[0] - a[0], corner[1] - a[1]];
             let along = (offset[0] * chord[0] + offset[1] * chord[1]) / square;
             let across = (offset[1] * chord[0] - offset[0] * chord[1]) / square;
-            // What is farther than the segment is long presses on nothing here.
+            // Edges farther away than the length of the segment have no effect here.
             if !(-0.5..1.5).contains(&along) || across.abs() > 1.0 {
                 continue;
             }
             let mut parameter = start + along * (end - start);
-            // Newton's method without the curve's bend: the segment is nearly straight.
+            // Newton's method without the curvature, because the segment is nearly straight.
             for _ in 0..8 {
                 let (position, slope) = at(parameter);
                 let metric = slope[0] * slope[0] + slope[1] * slope[1];
@@ -88,7 +84,7 @@ impl Placement<'_> {
         cuts
     }
 
-    /// Where a node is: in linear kinematics at its undeformed radius, as gaps are.
+    /// Current position of a node. In linear kinematics it is at its undeformed radius, like gaps.
     pub(crate) fn current(&self, node: usize) -> [f64; 2] {
         let [r, z] = self.nodes[node];
         let [u, w] = self.moved(node);
@@ -102,8 +98,8 @@ impl Placement<'_> {
         [self.displacement[2 * node], self.displacement[2 * node + 1]]
     }
 
-    /// Deformed area over reference area at a point of an edge with these shape functions (one in
-    /// linear kinematics).
+    /// Deformed area over reference area at a point of an edge with these shape functions. It is
+    /// one in linear kinematics.
     pub(crate) fn stretch(
         &self,
         shape: &[f64; 3],
@@ -122,26 +118,26 @@ impl Placement<'_> {
     }
 }
 
-/// A gap and its derivatives by the displacement components `dofs`.
+/// A gap with its derivatives by the displacement components `dofs`.
 #[derive(Debug, Clone)]
 pub(crate) struct Gap {
     pub value: f64,
     pub dofs: Vec<usize>,
     pub first: Vec<f64>,
-    /// Row after row.
+    /// Second derivatives, row by row.
     pub second: Vec<f64>,
-    /// Axial component of the force by a unit pressure, over the reference area.
+    /// Axial component of the force from a unit pressure, per reference area.
     pub axial: f64,
 }
 
-/// The point of a surface that is closest to another.
+/// The closest point of a surface to another point.
 pub(crate) struct Nearest {
     pub at: CurvePoint,
     /// Parameter on its edge.
     xi: f64,
 }
 
-/// The average of gaps with weights that sum to `total`.
+/// The weighted average of gaps. The weights sum to `total`.
 fn averaged(gaps: &[(Gap, f64)], total: f64) -> Gap {
     let mut dofs: Vec<usize> = Vec::with_capacity(24);
     for (gap, _) in gaps {
@@ -176,7 +172,7 @@ fn averaged(gaps: &[(Gap, f64)], total: f64) -> Gap {
 }
 
 impl Placement<'_> {
-    /// The gap of a point, `None` where there is nothing opposite to it.
+    /// The gap of a point. `None` if nothing is opposite to it.
     pub(crate) fn gap(&self, point: &GapPoint, opposite: &Opposite) -> Option<Gap> {
         match opposite {
             Opposite::Rigid { shape, side } => self.rigid_gap(point, *shape, *side),
@@ -196,7 +192,8 @@ impl Placement<'_> {
             shape.profile(if linear { reference[0] } else { position[0] })?;
         let (slope, bend) = if linear { (0.0, 0.0) } else { (slope, bend) };
         let moved = if driven { self.approach } else { 0.0 };
-        // Above the surface (side +1) the shape's pole is its lowest point; below, its highest.
+        // Above the surface (side +1) the pole of the shape is its lowest point; below, its
+        // highest.
         let value = side * (moved - position[1]) + profile;
         let mut dofs = Vec::with_capacity(7);
         let mut first = Vec::with_capacity(7);
@@ -224,14 +221,14 @@ impl Placement<'_> {
         })
     }
 
-    /// The closest point of a deformed surface. `None` beyond its outer end.
+    /// The closest point of a deformed surface. `None` outside its outer end.
     pub(crate) fn nearest(&self, curve: &SurfaceCurve, position: [f64; 2]) -> Option<Nearest> {
         let mut best: Option<(f64, Nearest, bool)> = None;
         for (index, edge) in curve.edges().iter().enumerate() {
             let [a, _, b] = edge.map(|node| self.current(node));
             let length = (b[0] - a[0]).hypot(b[1] - a[1]);
             let to_a = (position[0] - a[0]).hypot(position[1] - a[1]);
-            // No point of the edge is nearer than this: edges bulge less than a fifth.
+            // Lower bound of the distance to the edge: edges bulge by less than a fifth.
             if best
                 .as_ref()
                 .is_some_and(|(distance, ..)| to_a - 1.2 * length > *distance)
@@ -266,8 +263,8 @@ impl Placement<'_> {
         let curvature = bend[0] * normal[0] + bend[1] * normal[1];
         let denominator = metric - value * curvature;
         let mut relative = Relative::new(point, &at, normal, along);
-        // At a kink between edges, or deep within a strongly bent surface, the closest point does
-        // not slide or is not unique: no second derivative.
+        // At a kink between edges, or deep inside a strongly curved surface, the closest point does
+        // not slide or is not unique. The second derivative is then omitted.
         if xi.abs() < 1.0 && denominator > 0.1 * metric {
             let bent = curvature / metric;
             relative.fill_second(|slip_i, turn_i, slip_j, turn_j| {
@@ -281,14 +278,15 @@ impl Placement<'_> {
         Some(relative.gap(value, normal))
     }
 
-    /// Parameter of an edge's closest point, within [−1, 1].
+    /// Parameter of the closest point on an edge, limited to [−1, 1].
     fn closest(&self, curve: &SurfaceCurve, edge: usize, point: [f64; 2]) -> f64 {
         let [a, _, b] = curve.edges()[edge].map(|node| self.current(node));
         let chord = [b[0] - a[0], b[1] - a[1]];
         let square = chord[0] * chord[0] + chord[1] * chord[1];
         let along = (point[0] - a[0]) * chord[0] + (point[1] - a[1]) * chord[1];
         let mut xi = (2.0 * along / square - 1.0).clamp(-1.0, 1.0);
-        // Newton's method on (x − x(ξ)) · x'(ξ) = 0: edges are nearly straight, few steps do.
+        // Newton's method on (x − x(ξ)) · x'(ξ) = 0. Edges are nearly straight, so a few steps are
+        // enough.
         for _ in 0..20 {
             let at = curve.at(edge, xi);
             let position = at.sum(&at.position, |n| self.current(n));
@@ -297,7 +295,8 @@ impl Placement<'_> {
             let offset = [point[0] - position[0], point[1] - position[1]];
             let metric = slope[0] * slope[0] + slope[1] * slope[1];
             let curved = metric - offset[0] * bend[0] - offset[1] * bend[1];
-            // Far from a strongly bent edge the derivative may vanish: the metric alone then.
+            // Far from a strongly curved edge the derivative may vanish; then only the metric is
+            // used.
             let divisor = if curved > 0.1 * metric {
                 curved
             } else {
@@ -313,7 +312,7 @@ impl Placement<'_> {
         xi
     }
 
-    /// Edge and parameter of a surface's point at a reference radius.
+    /// Edge and parameter of the surface point at a reference radius.
     pub(crate) fn opposite(&self, curve: &SurfaceCurve, radius: f64) -> Option<(usize, f64)> {
         let edge = curve.edges().iter().position(|edge| {
             let [a, _, b] = edge.map(|node| self.nodes[node][0]);
@@ -330,7 +329,7 @@ impl Placement<'_> {
         Some((edge, xi))
     }
 
-    /// Height over the undeformed surface at the same radius, both displaced along z.
+    /// Height above the undeformed surface at the same radius, with both displaced along z.
     fn vertical_gap(&self, point: &GapPoint, curve: &SurfaceCurve) -> Option<Gap> {
         let reference = combine(&point.shape, point.nodes, |n| self.nodes[n]);
         let moved = combine(&point.shape, point.nodes, |n| self.moved(n));
@@ -338,21 +337,21 @@ impl Placement<'_> {
         let at = curve.at(edge, xi);
         let [_, z] = at.sum(&at.position, |n| self.nodes[n]);
         let [_, w] = at.sum(&at.position, |n| self.moved(n));
-        // The outward normal of a surface above points down.
+        // The outward normal of a surface above points downwards.
         let up = -curve.side;
         let value = up * (reference[1] + moved[1] - z - w);
         Some(Relative::new(point, &at, [0.0, up], [0.0; 2]).gap(value, [0.0, up]))
     }
 }
 
-/// Components of the displacement of a point relative to one of a curve, by their nodes'.
+/// Derivatives of a point's displacement relative to a curve point, by the nodal components.
 struct Relative {
     dofs: Vec<usize>,
-    /// Along the normal.
+    /// Component along the normal.
     first: Vec<f64>,
-    /// Along the curve.
+    /// Component along the curve.
     slip: Vec<f64>,
-    /// The curve's turning.
+    /// Rotation of the curve.
     turn: Vec<f64>,
     second: Vec<f64>,
 }
@@ -409,20 +408,20 @@ impl Relative {
     }
 }
 
-/// A node of a contact surface that is in contact or may come into it.
+/// A node of a contact surface that touches or may touch.
 #[derive(Debug, Clone)]
 pub(crate) struct Candidate {
     /// Index of the contact node.
     pub index: usize,
     pub gap: Gap,
-    /// λ − ε g: the pressure per reference area if positive.
+    /// λ − ε g: the pressure per reference area, if positive.
     pub pressure: f64,
-    /// From where it sticks, if it does.
+    /// Slip from the anchor. `None` if the node does not stick.
     pub slip: Option<Slip>,
 }
 
 impl ElementModel {
-    /// Where contact is judged at a state.
+    /// The geometry for the contact evaluation in a state.
     pub(crate) fn placement<'a>(&'a self, fields: &'a ModelFields) -> Placement<'a> {
         Placement {
             kinematics: self.kinematics,
@@ -432,7 +431,7 @@ impl ElementModel {
         }
     }
 
-    /// Contact nodes that touch or are nearer than two spacings and `margin`.
+    /// Contact nodes that touch, or are closer than two spacings plus `margin`.
     pub(crate) fn candidates(&self, fields: &ModelFields, margin: f64) -> Vec<Candidate> {
         let placement = self.placement(fields);
         let points = self.contact_points(fields);
@@ -448,7 +447,7 @@ impl ElementModel {
         let mut candidates = Vec::new();
         for (index, (node, around)) in self.contact_nodes.iter().zip(&around).enumerate() {
             let total: f64 = around.iter().map(|(_, weight)| weight).sum();
-            // A node at a punch's rim has half of its surroundings under it.
+            // A node at the rim of a punch has half of its surroundings under it.
             if total < LEAST_SHARE * node.weight {
                 continue;
             }
@@ -470,7 +469,7 @@ impl ElementModel {
         candidates
     }
 
-    /// The points at which gaps are measured at a state.
+    /// The points at which gaps are measured in a state.
     pub(crate) fn contact_points(&self, fields: &ModelFields) -> Vec<GapPoint> {
         let placement = self.placement(fields);
         let mut points = Vec::with_capacity(3 * self.segments.len());

@@ -1,16 +1,14 @@
 //! The element: nine displacement nodes, three discontinuous pressures.
 //!
-//! The perturbed Lagrangian $\int W_{dev} + p (J - 1) - p^2 / 2\kappa$ with p linear in (r, z)
-//! within each element.
-//!
-//! Elimination of an element's pressures and of its centre node, so that the global system holds
-//! the displacements of the eight outer nodes alone and is symmetric.
+//! It uses the perturbed Lagrangian $\int W_{dev} + p (J - 1) - p^2 / 2\kappa$ with p linear in (r,
+//! z) within each element. The pressures of an element and its centre node are eliminated, so that
+//! the global system contains only the displacements of the eight outer nodes and is symmetric.
 
 use crate::material::{Gradient, Kinematics, Material, PointDeformation, StressResponse};
 
-/// Displacement components of the outer nodes (r, z of each).
+/// Number of displacement components of the outer nodes (r, z of each).
 pub(crate) const OUTER: usize = 16;
-/// Displacement components of all nodes.
+/// Number of displacement components of all nodes.
 pub(crate) const ALL: usize = 18;
 
 /// Three-point Gauss rule on [−1, 1].
@@ -20,7 +18,7 @@ pub(crate) const GAUSS3: [(f64, f64); 3] = [
     (0.774_596_669_241_483_4, 5.0 / 9.0),
 ];
 
-/// Quadratic shape functions at x = −1, 0, 1 and their derivatives, for x in [−1, 1].
+/// Quadratic shape functions with nodes at −1, 0 and 1, and their derivatives, for x in [−1, 1].
 pub(crate) fn quadratic(x: f64) -> ([f64; 3], [f64; 3]) {
     (
         [0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0)],
@@ -28,7 +26,7 @@ pub(crate) fn quadratic(x: f64) -> ([f64; 3], [f64; 3]) {
     )
 }
 
-/// Columns and rows of the nine nodes among the three each way.
+/// Columns and rows of the nine nodes in the grid of three by three.
 const GRID: [[usize; 2]; 9] = [
     [0, 0],
     [2, 0],
@@ -48,7 +46,7 @@ pub(crate) fn shape(xi: f64, eta: f64) -> [[f64; 3]; 9] {
     GRID.map(|[i, j]| [a[i] * b[j], da[i] * b[j], a[i] * db[j]])
 }
 
-/// Shape values at a Gauss point in the reference configuration.
+/// Values of the shape functions at a Gauss point in the reference configuration.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct GaussPoint {
     /// ∂N/∂r of each node.
@@ -71,8 +69,8 @@ pub(crate) struct ElementGeometry {
     inverse_mass: [[f64; 3]; 3],
 }
 
-/// Where shape functions put the point of an element, the derivatives of that by ξ and η, and their
-/// determinant.
+/// Position of a point of an element from its shape functions, the derivatives of the position by ξ
+/// and η, and their determinant.
 pub(crate) fn position(
     nodes: &[[f64; 2]; 9],
     shapes: &[[f64; 3]; 9],
@@ -90,7 +88,7 @@ pub(crate) fn position(
     (position, jacobian, determinant)
 }
 
-/// The point ξ, η of an element: position, gradients, Jacobian's determinant.
+/// The point ξ, η of an element: position, gradients, and determinant of the Jacobian.
 pub(crate) fn map(nodes: &[[f64; 2]; 9], xi: f64, eta: f64) -> ([f64; 2], [[f64; 3]; 9], f64) {
     let shapes = shape(xi, eta);
     let (position, jacobian, determinant) = position(nodes, &shapes);
@@ -116,7 +114,7 @@ pub(crate) fn pressure_functions(nodes: &[[f64; 2]; 9], position: [f64; 2]) -> [
 }
 
 impl ElementGeometry {
-    /// `None` where the element is turned inside out or degenerate at a Gauss point.
+    /// `None` if the element is inverted or degenerate at a Gauss point.
     pub(crate) fn new(nodes: &[[f64; 2]; 9]) -> Option<Self> {
         let mut points: [GaussPoint; 9] = Default::default();
         let mut mass = nalgebra::Matrix3::<f64>::zeros();
@@ -177,7 +175,7 @@ impl GaussPoint {
     }
 }
 
-/// What an element contributes before elimination.
+/// Contributions of an element before the elimination.
 pub(crate) struct Forces {
     /// Derivative of the deviatoric energy by the nodal displacements.
     deviatoric: [f64; ALL],
@@ -194,7 +192,7 @@ impl Forces {
     }
 }
 
-/// Nodal forces and those of pressures added.
+/// Adds the nodal forces of pressures.
 fn with_pressures(
     forces: &[f64; ALL],
     volume_by_displacement: &[[f64; ALL]; 3],
@@ -209,7 +207,7 @@ fn with_pressures(
     forces
 }
 
-/// Sums over Gauss points, of all nodes along r and along z.
+/// Sums over Gauss points, for all nodes along r and along z.
 #[derive(Default)]
 struct Sums {
     deviatoric: [[f64; 9]; 2],
@@ -256,7 +254,7 @@ impl Sums {
 
 /// Second derivatives of the energy by the nodes' displacements.
 struct Stiffness {
-    /// By u_r of both nodes, by u_z of both, by u_r of the first and u_z of the second.
+    /// By u_r of both nodes, by u_z of both, and by u_r of the first and u_z of the second.
     radial: [[f64; 9]; 9],
     axial: [[f64; 9]; 9],
     mixed: [[f64; 9]; 9],
@@ -268,7 +266,7 @@ impl Stiffness {
         let (by_r, by_z, over_r) = (&point.by_r, &point.by_z, &point.over_r);
         for i in 0..9 {
             let (r, z, o) = (by_r[i], by_z[i], over_r[i]);
-            // Stress increments from unit displacements of node i along r and along z.
+            // Stress increments from unit displacements of node i along r and z.
             let [along_r, along_z] = [
                 core::array::from_fn(|k| {
                     let [a, b, _, _, c] = tangent[k];
@@ -291,7 +289,7 @@ impl Stiffness {
         }
     }
 
-    /// Of all components, lower half.
+    /// All components, lower half.
     fn interleaved(&self) -> [[f64; ALL]; ALL] {
         let mut all = [[0.0; ALL]; ALL];
         for i in 0..9 {
@@ -307,7 +305,7 @@ impl Stiffness {
 }
 
 impl ElementGeometry {
-    /// Forces at given displacements. `None` where the element is turned inside out.
+    /// Forces at given displacements. `None` if the element is inverted.
     pub(crate) fn forces(
         &self,
         kinematics: Kinematics,
@@ -322,8 +320,8 @@ impl ElementGeometry {
         Some(forces.forces())
     }
 
-    /// Forces, and the second derivative of the energy by the nodal displacements at fixed
-    /// pressures, lower half.
+    /// Forces, and the lower half of the second derivative of the energy by the nodal displacements
+    /// at fixed pressures.
     fn forces_and_stiffness(
         &self,
         kinematics: Kinematics,
@@ -349,23 +347,25 @@ impl ElementGeometry {
     }
 }
 
-/// An element's contribution to the global system, and what recovers its eliminated unknowns.
+/// Contribution of an element to the global system, and the data to recover its eliminated
+/// unknowns.
 #[derive(Debug, Clone)]
 pub(crate) struct Condensed {
     /// Stiffness of the outer nodes, lower half.
     pub stiffness: [[f64; OUTER]; OUTER],
-    /// Residual of the outer nodes after elimination.
+    /// Residual of the outer nodes after the elimination.
     pub residual: [f64; OUTER],
     pub elimination: Elimination,
 }
 
-/// What recovers the centre's displacement and the pressures from the outer nodes' increments.
+/// Data to recover the centre's displacement and the pressures from the increments of the outer
+/// nodes.
 #[derive(Debug, Clone)]
 pub(crate) struct Elimination {
     centre_inverse: [[f64; 2]; 2],
     centre_row: [[f64; OUTER]; 2],
     centre_residual: [f64; 2],
-    /// The deviatoric stress's forces before the step.
+    /// Nodal forces of the deviatoric stress before the step.
     deviatoric: [f64; ALL],
     volume_by_displacement: [[f64; ALL]; 3],
     /// ∫ψⱼ (J − 1) before the step.
@@ -375,7 +375,8 @@ pub(crate) struct Elimination {
 }
 
 impl ElementGeometry {
-    /// Stiffness and residual with pressures and centre eliminated. `None` where turned inside out.
+    /// Stiffness and residual after elimination of pressures and centre. `None` if the element is
+    /// inverted.
     pub(crate) fn condensed(
         &self,
         kinematics: Kinematics,
@@ -389,9 +390,9 @@ impl ElementGeometry {
         Some(self.eliminate(material.bulk_modulus(), &forces, stiffness, centre_load))
     }
 
-    /// Outer residual and elimination after a slight change of shape and material, by the forces
-    /// there and the stiffness `before`: right to first order in the change. `None` where turned
-    /// inside out.
+    /// Outer residual and elimination after a small change of shape and material, from the new
+    /// forces and the stiffness `before`. This is accurate to first order in the change. `None` if
+    /// the element is inverted.
     pub(crate) fn nearby(
         &self,
         kinematics: Kinematics,
@@ -410,7 +411,7 @@ impl ElementGeometry {
         Some(elimination.balanced([0.0; 2]))
     }
 
-    /// As [`Self::nearby`] of the same shape: forces are proportional to the moduli.
+    /// Like [`Self::nearby`], for an unchanged shape: forces are proportional to the moduli.
     pub(crate) fn of_material(
         &self,
         [from, to]: [&Material; 2],
@@ -425,11 +426,11 @@ impl ElementGeometry {
         elimination.balanced([0.0; 2])
     }
 
-    /// Residual of all nodes with the pressures eliminated by the tangent `before`, and κM⁻¹∫ψ(J −
-    /// 1). `None` where turned inside out.
+    /// Residual of all nodes, with the pressures eliminated by the tangent `before`, and κM⁻¹∫ψ(J −
+    /// 1). `None` if the element is inverted.
     ///
-    /// The pressures stay unknowns of their own: with $\partial J/\partial u$ of here in their
-    /// elimination, a tangent of elsewhere would be wrong by κ/μ times the difference.
+    /// The pressures remain independent unknowns: if the current $\partial J/\partial u$ were used
+    /// in their elimination, the earlier tangent would be wrong by κ/μ times the difference.
     pub(crate) fn balance(
         &self,
         kinematics: Kinematics,
@@ -508,13 +509,13 @@ impl ElementGeometry {
 }
 
 impl Elimination {
-    /// Residual of the nodes with the pressures eliminated, before loads.
+    /// Residual of the nodes after elimination of the pressures, without loads.
     fn residual(&self) -> [f64; ALL] {
         let pressures = product(&self.compliance_inverse, &self.volume);
         with_pressures(&self.deviatoric, &self.volume_by_displacement, &pressures)
     }
 
-    /// Outer residual with the centre eliminated, and this with the centre's.
+    /// Outer residual after elimination of the centre, and `self` with the residual of the centre.
     fn balanced(mut self, centre_load: [f64; 2]) -> ([f64; OUTER], Self) {
         let mut residual = self.residual();
         for (k, load) in centre_load.into_iter().enumerate() {
@@ -524,12 +525,12 @@ impl Elimination {
         (self.outer_residual(&residual), self)
     }
 
-    /// Outer residual before the step that this is for.
+    /// Outer residual before the step that this elimination belongs to.
     pub(crate) fn outer_residual_before(&self) -> [f64; OUTER] {
         self.outer_residual(&self.residual())
     }
 
-    /// What the centre's residuals give the outer component `i`.
+    /// Contribution of the centre's residuals to the outer component `i`.
     fn gain(&self, i: usize) -> [f64; 2] {
         let column = [self.centre_row[0][i], self.centre_row[1][i]];
         let inverse = &self.centre_inverse;
@@ -539,7 +540,7 @@ impl Elimination {
         ]
     }
 
-    /// Residual of the outer nodes with the centre eliminated.
+    /// Residual of the outer nodes after elimination of the centre.
     pub(crate) fn outer_residual(&self, residual: &[f64; ALL]) -> [f64; OUTER] {
         core::array::from_fn(|i| {
             let gain = self.gain(i);
@@ -568,7 +569,7 @@ impl Elimination {
         (centre, core::array::from_fn(|k| before[k] + change[k]))
     }
 
-    /// Change of κM⁻¹∫ψ(J − 1) by increments.
+    /// Change of κM⁻¹∫ψ(J − 1) because of increments.
     pub(crate) fn pressure_change(&self, outer: &[f64; OUTER], centre: [f64; 2]) -> [f64; 3] {
         let volume = self.volume_by_displacement.map(|row| {
             let by_outer: f64 = row.iter().zip(outer).map(|(a, b)| a * b).sum();
@@ -578,7 +579,7 @@ impl Elimination {
     }
 }
 
-/// κM⁻¹ times ∫ψ(J − 1): the pressures of an element in balance, for ∫ψ(J − 1) − M p/κ = 0.
+/// κM⁻¹ times ∫ψ(J − 1): the equilibrium pressures of an element, for which ∫ψ(J − 1) − M p/κ = 0.
 fn product(compliance_inverse: &[[f64; 3]; 3], volume: &[f64; 3]) -> [f64; 3] {
     compliance_inverse.map(|row| row.iter().zip(volume).map(|(a, b)| a * b).sum())
 }

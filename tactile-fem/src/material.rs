@@ -1,8 +1,8 @@
-//! Materials and the stress they give.
+//! Materials and their stress response.
 
 use tactile_elasticity::{ElasticityError, Quantity};
 
-/// Largest Poisson ratio the elements take: at ½ the bulk modulus is infinite.
+/// Largest Poisson ratio that the elements support: at ½ the bulk modulus is infinite.
 const LARGEST_POISSON_RATIO: f64 = 0.4999;
 
 /// An isotropic elastic material: compressible neo-Hookean at finite strain,
@@ -27,10 +27,10 @@ pub struct Material {
 }
 
 impl Material {
-    /// Young's modulus (Pa) and Poisson ratio.
+    /// Creates a material from Young's modulus (Pa) and Poisson ratio.
     ///
     /// # Errors
-    /// A modulus that is not positive. a Poisson ratio outside (−1, 0.4999].
+    /// An error for a modulus that is not positive, or a Poisson ratio outside (−1, 0.4999].
     pub fn new(youngs_modulus_pa: f64, poisson_ratio: f64) -> Result<Self, ElasticityError> {
         Quantity::YoungsModulus.positive(youngs_modulus_pa)?;
         if !(poisson_ratio > -1.0 && poisson_ratio <= 0.5) {
@@ -80,33 +80,33 @@ impl Material {
     }
 }
 
-/// How displacement makes strain, and on which geometry contact is judged.
+/// Strain measure, and the geometry on which contact is evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Kinematics {
-    /// Finite strain. Contact on the deformed surfaces.
+    /// Finite strain, with contact on the deformed surfaces.
     #[default]
     Finite,
-    /// Infinitesimal strain and Hooke's law. Contact gaps along z on the undeformed surfaces.
+    /// Infinitesimal strain and Hooke's law, with contact gaps along z on the undeformed surfaces.
     Linear,
 }
 
 /// The components of the deformation gradient: rr, rz, zr, zz, θθ.
 pub(crate) type Gradient = [f64; 5];
 
-/// Stress without its pressure part, and volume change.
+/// Stress without its pressure part, and the volume change.
 pub(crate) struct StressResponse {
     /// Deviatoric first Piola–Kirchhoff stress.
     pub stress: Gradient,
     /// Volume change J − 1 (the strain's trace in linear kinematics).
     pub volume: f64,
-    /// Its derivative, the cofactor of F.
+    /// Derivative of the volume change, the cofactor of F.
     pub cofactor: Gradient,
 }
 
-/// (1 + v)^(−1/3) to rounding.
+/// (1 + v)^(−1/3), accurate to rounding.
 #[inline]
 pub(crate) fn inverse_cube_root(v: f64) -> f64 {
-    // The series' error is below 0.15 v⁴, and twice its square after a step of Newton's method.
+    // The error of the series is below 0.15 v⁴, and about twice its square after a Newton step.
     const SERIES: f64 = 0.1;
     let j = 1.0 + v;
     if v.abs() > SERIES {
@@ -119,7 +119,7 @@ pub(crate) fn inverse_cube_root(v: f64) -> f64 {
     x
 }
 
-/// A material point as deformed: what stress and tangent have in common.
+/// A deformed material point: the quantities common to stress and tangent.
 pub(crate) enum PointDeformation {
     Linear {
         shear: f64,
@@ -139,14 +139,14 @@ pub(crate) enum PointDeformation {
 }
 
 impl PointDeformation {
-    /// At displacement gradient `h`. `None` where J ≤ 0.
+    /// Creates the point for a displacement gradient `h`. `None` if J ≤ 0.
     #[inline]
     pub(crate) fn new(kinematics: Kinematics, shear: f64, h: &Gradient) -> Option<Self> {
         if kinematics == Kinematics::Linear {
             return Some(Self::Linear { shear, h: *h });
         }
         let f = [1.0 + h[0], h[1], h[2], 1.0 + h[3], 1.0 + h[4]];
-        // J − 1 expanded, so that small strains keep their digits.
+        // J − 1 in expanded form, so that small strains keep their digits.
         let plane = h[0] + h[3] + h[0] * h[3] - h[1] * h[2];
         let volume = plane + h[4] + plane * h[4];
         let j = 1.0 + volume;
@@ -239,7 +239,7 @@ impl PointDeformation {
                     }
                     a[k][k] += scale;
                 }
-                // The second derivative of J, from the pressure and from the deviator.
+                // The second derivative of J, with factors from the pressure and the deviator.
                 let factor = pressure - scale * invariant / (3.0 * j);
                 let second = [
                     (0, 3, f[4]),

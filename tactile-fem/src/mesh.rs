@@ -1,35 +1,36 @@
-//! Meshes of nine-node quadrilaterals in the half plane (r, z): mapped meshes of the bodies that a
-//! sensor meets, and of a tissue block with a spherical inclusion under a guide's flat face.
+//! Meshes of nine-node quadrilaterals in the half plane (r, z): mapped meshes of the bodies that
+//! touch a sensor, and of a tissue block with a spherical inclusion under the flat face of a guide.
 
 use crate::spacing::{arc_fractions, graded, graded_up_to, grow, with_middles};
 use std::collections::BTreeMap;
 
-/// Between a ball's core and the first shell, as a share of an element. With 0.02 the mesh of
-/// sixteen elements has one without area, with 0.05 and 0.2 all from 2 to 24 are sound (the test
-/// `a_ball_can_be_meshed_at_any_fineness`); more squeezes the core's corner instead.
+/// Distance between the core of a ball and the first shell, relative to an element. With 0.02 the
+/// mesh of sixteen elements has a degenerate one; with 0.05 and 0.2 all meshes from 2 to 24
+/// elements are valid (test `a_ball_can_be_meshed_at_any_fineness`). A larger value compresses the
+/// corner of the core.
 const CORNER_ROOM: f64 = 0.05;
 
-/// Elements along an eighth of the inclusion's circumference up to which they hold it: finer
-/// meshes have flatter elements at the rim, and with seven those of 0.045 turn over at some
-/// tenths of the height.
+/// Maximum number of elements along an eighth of the inclusion's circumference for sliding faces.
+/// Finer meshes have flatter elements at the rim, and with seven, those of 0.045 are inverted at an
+/// approach of several tenths of the height.
 const SLIDING_FINENESS: f64 = 5.0;
 
-/// Shortest element at the rim of a face that slides, over the face's radius. Shared
-/// displacements hold finer ones less and less as the face sinks in: of 0.02, they turn over at a
-/// tenth of the block's height, and the pressure within three quarters of the face jumps by 1 %.
-/// Until then it is that of the finer ones within 0.05 %.
+/// Shortest element at the rim of a sliding face, relative to the face radius. Shared displacements
+/// are less and less valid for finer elements as the face sinks in: elements of 0.02 are inverted
+/// at a tenth of the block's height, and the pressure within three quarters of the face jumps by 1
+/// %. Until then it agrees with that of finer elements within 0.05 %.
 const SLIDING_RIM: f64 = 0.045;
 
-/// Parts of a body's boundary that conditions and contact refer to.
+/// Parts of a body's boundary to which conditions and contact refer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum Boundary {
     /// The surface that may touch another body.
     Contact,
     /// The axis of revolution, r = 0.
     Axis,
-    /// The surface that is held or driven: a guide's glass, a half ball's equator.
+    /// The surface that is held or driven: the glass of a guide, or the equator of a half ball.
     Base,
-    /// An object's far side, held by a stage.
+    /// The far side of an object, held by a stage.
     Stage,
     /// The free outer surface.
     Side,
@@ -39,14 +40,14 @@ pub(crate) enum Boundary {
 
 /// A mesh of nine-node quadrilaterals in the half plane (r, z), r ≥ 0, of a body of revolution.
 ///
-/// Each element belongs to a region, numbered from zero, that has one material. Edges of a boundary
-/// run with the body on their left.
+/// Each element belongs to a region, numbered from zero, with one material. The edges of a boundary
+/// are oriented with the body on their left.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Mesh {
     /// Reference coordinates (r, z) of the nodes, in metres.
     pub nodes: Vec<[f64; 2]>,
-    /// Nodes of each element: corners counter-clockwise, then the middles of the edges in the same
-    /// order, then the centre.
+    /// Nodes of each element: corners counter-clockwise, then the midpoints of the edges in the
+    /// same order, then the centre.
     pub elements: Vec<[usize; 9]>,
     pub regions: Vec<usize>,
     pub boundaries: BTreeMap<Boundary, Vec<[usize; 3]>>,
@@ -61,7 +62,7 @@ impl Mesh {
         self.regions.iter().max().map_or(0, |last| last + 1)
     }
 
-    /// Gives every outer edge off the axis the name that `name` finds for its middle node.
+    /// Names each outer edge off the axis by the result of `name` for its middle node.
     fn name_outer_edges(&mut self, name: impl Fn([f64; 2]) -> Boundary) {
         let mut uses: BTreeMap<usize, usize> = BTreeMap::new();
         for element in &self.elements {
@@ -84,7 +85,7 @@ impl Mesh {
         }
         let nodes = &self.nodes;
         for edges in self.boundaries.values_mut() {
-            // Ordered by radius, so that pressures come out from the axis outwards.
+            // Ordered by radius, so that pressures are listed from the axis outwards.
             edges.sort_by(|a, b| {
                 let (a, b) = (nodes[a[1]], nodes[b[1]]);
                 a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]))
@@ -92,8 +93,8 @@ impl Mesh {
         }
     }
 
-    /// Names the edges between elements for which `inside` holds and the others. They run with the
-    /// elements inside on their left.
+    /// Names the edges between elements for which `inside` is true and the others. They are
+    /// oriented with the inside elements on their left.
     fn name_interface(&mut self, boundary: Boundary, inside: impl Fn(usize) -> bool) {
         let mut outside_middles = std::collections::BTreeSet::new();
         for (element, &region) in self.elements.iter().zip(&self.regions) {
@@ -116,7 +117,7 @@ impl Mesh {
     }
 }
 
-/// Puts meshes together from mapped blocks. Nodes that coincide are merged.
+/// Assembles meshes from mapped blocks. Coincident nodes are merged.
 #[derive(Debug, Default)]
 struct MeshBuilder {
     nodes: Vec<[f64; 2]>,
@@ -126,7 +127,7 @@ struct MeshBuilder {
 
 impl MeshBuilder {
     /// Adds a block of `columns` by `rows` elements whose node (i, j), i ≤ 2 columns, j ≤ 2 rows,
-    /// is at `position(i, j)`. I then j must turn counter-clockwise.
+    /// is at `position(i, j)`. The directions i, j must be oriented counter-clockwise.
     pub(crate) fn block(
         &mut self,
         columns: usize,
@@ -170,8 +171,8 @@ impl MeshBuilder {
     }
 
     /// Adds a block between four sides given by their nodes (bottom and top along i, left and right
-    /// along j) by transfinite interpolation, blended by the sides' arc lengths so that their
-    /// grading carries inwards.
+    /// along j) by transfinite interpolation. The blending uses the arc lengths of the sides, so
+    /// that their grading continues inside.
     fn transfinite(
         &mut self,
         bottom: &[[f64; 2]],
@@ -186,7 +187,7 @@ impl MeshBuilder {
         let (left_s, right_s) = (arc_fractions(left), arc_fractions(right));
         let (last_i, last_j) = (bottom.len() - 1, left.len() - 1);
         self.block(last_i / 2, last_j / 2, region, |i, j| {
-            // Where the line from bottom to top crosses the one from left to right.
+            // Intersection of the line from bottom to top with the line from left to right.
             let du = top_s[i] - bottom_s[i];
             let dv = right_s[j] - left_s[j];
             let u = (bottom_s[i] + left_s[j] * du) / (1.0 - du * dv);
@@ -201,10 +202,10 @@ impl MeshBuilder {
         });
     }
 
-    /// The mesh, without boundaries.
+    /// Builds the mesh, without boundaries.
     pub(crate) fn build(self) -> Mesh {
-        // Coincident nodes of neighbouring blocks differ by rounding alone, distinct ones by a
-        // fraction of an element: a ten-millionth of the extent tells them apart.
+        // Coincident nodes of adjacent blocks differ only by rounding, and distinct ones by a
+        // fraction of an element: a ten-millionth of the extent separates the cases.
         let extent = (self.nodes.iter()).fold(0.0_f64, |m, p| m.max(p[0].abs()).max(p[1].abs()));
         let cell = 1e-7 * extent.max(f64::MIN_POSITIVE);
         let mut index: BTreeMap<(i64, i64), usize> = BTreeMap::new();
@@ -223,7 +224,7 @@ impl MeshBuilder {
                 nodes.len() - 1
             }));
         }
-        // A node within rounding of the axis is on it.
+        // A node within rounding of the axis is moved onto it.
         for node in &mut nodes {
             if node[0].abs() < cell {
                 node[0] = 0.0;
@@ -239,20 +240,20 @@ impl MeshBuilder {
     }
 }
 
-/// Size of the elements of a body with a contact around its axis.
+/// Element sizes of a body with a contact around its axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ContactMesh {
     /// Radius of the core with uniform elements, about half the smallest contact radius.
     pub inner: f64,
-    /// Elements across the core.
+    /// Number of elements across the core.
     pub count: usize,
-    /// Growth of the elements outwards.
+    /// Growth factor of the elements outwards.
     pub growth: f64,
 }
 
 impl ContactMesh {
-    /// Distance from the pole to the core's corner inside the body: beyond the core's ends, inside
-    /// the first shell.
+    /// Distance from the pole to the corner of the core inside the body: outside the ends of the
+    /// core, inside the first shell.
     fn corner(&self) -> f64 {
         self.inner * (1.0 + 0.8 / self.count as f64).min(1.16)
     }
@@ -261,31 +262,31 @@ impl ContactMesh {
 /// A spheroidal inclusion on the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct InclusionSize {
-    /// Across the axis and along it.
+    /// Half axes across the axis and along it.
     pub half_axes: [f64; 2],
-    /// From the block's surface to the inclusion's top.
+    /// Distance from the surface of the block to the top of the inclusion.
     pub depth: f64,
 }
 
-/// A body's lowest point: a core of quadrilaterals, and shells around it.
+/// The lowest point of a body: a core of quadrilaterals with shells around it.
 struct Pole<S> {
-    /// Elements along each side of the core.
+    /// Number of elements along each side of the core.
     elements: usize,
-    /// Parameter of the surface where the core ends.
+    /// Surface parameter of the end of the core.
     core: f64,
-    /// The core's upper end on the axis.
+    /// Upper end of the core on the axis.
     axis: [f64; 2],
-    /// The core's corner inside the body.
+    /// Corner of the core inside the body.
     corner: [f64; 2],
-    /// The surface over its parameter, from the pole at zero.
+    /// The surface as a function of its parameter, which is zero at the pole.
     surface: S,
-    /// Of the body's flat end.
+    /// Height of the flat end of the body.
     height: f64,
 }
 
 impl<S: Fn(f64) -> [f64; 2]> Pole<S> {
-    /// With shells at `parameters` (those of elements' ends and middles), where `shell` gives node
-    /// k of 4m + 1 from the surface to the axis.
+    /// Builds the mesh with shells at `parameters` (those of elements' ends and midpoints). `shell`
+    /// gives node k of 4m + 1 from the surface to the axis.
     fn mesh(&self, parameters: &[f64], shell: impl Fn(f64, usize) -> [f64; 2]) -> Mesh {
         let m = self.elements;
         let line = |a: [f64; 2], b: [f64; 2]| -> Vec<[f64; 2]> {
@@ -304,7 +305,7 @@ impl<S: Fn(f64) -> [f64; 2]> Pole<S> {
         let top = line(self.axis, self.corner);
         let mut builder = MeshBuilder::default();
         builder.transfinite(&bottom, &top, &left, &right, 0);
-        // Between the core's outer sides and the first shell.
+        // Block between the outer sides of the core and the first shell.
         let outer: Vec<[f64; 2]> = right
             .iter()
             .copied()
@@ -336,21 +337,21 @@ impl<S: Fn(f64) -> [f64; 2]> Pole<S> {
 
 impl Mesh {
     /// The half of a ball of radius `radius` on the side of its pole, which is at the origin. The
-    /// ball's centre is at z = `radius`, its equator [`Boundary::Base`].
+    /// centre of the ball is at z = `radius`, and its equator is [`Boundary::Base`].
     ///
-    /// Around a core of quadrilaterals at the pole lie shells along circles that meet the axis and
-    /// the ball's surface at right angles.
+    /// A core of quadrilaterals at the pole is surrounded by shells along circles that meet the
+    /// axis and the surface of the ball at right angles.
     pub(crate) fn half_ball(radius: f64, size: ContactMesh) -> Self {
         let m = size.count;
         let first = size.inner / m as f64;
-        // Angles of the shells along the surface; the first lies around the core.
+        // Angles of the shells along the surface. The first surrounds the core.
         let start = (size.inner + first) / radius;
         let limit = core::f64::consts::FRAC_PI_2;
         let largest = 1.6 * limit / (2.0 * m as f64);
         let mut angles = vec![start];
         grow(&mut angles, first / radius, size.growth, largest, limit);
         let angles = with_middles(&angles);
-        // Node k of 4m + 1 from the surface to the axis on the shell at `angle`.
+        // Node k of 4m + 1 from the surface to the axis, on the shell at `angle`.
         let shell = |angle: f64, k: usize| -> [f64; 2] {
             let v = k as f64 / (4 * m) as f64;
             if angle >= limit {
@@ -366,7 +367,7 @@ impl Mesh {
             debug_assert!(c >= 0.0);
             [circle * from_axis.sin(), top - 2.0 * circle * half * half]
         };
-        // The shells are nearer to the pole inside the ball than on its surface: on a fine mesh
+        // The shells are closer to the pole inside the ball than on its surface: on a fine mesh
         // they would cut the corner.
         let [r, z] = shell(start, 2 * m);
         let corner = size.corner().min(r.hypot(z) - CORNER_ROOM * first);
@@ -374,7 +375,7 @@ impl Mesh {
             elements: m,
             core: size.inner / radius,
             axis: [0.0, size.inner],
-            // The core's free corner lies inside the square's, which opens the angle there.
+            // The free corner of the core is inside that of a square, which opens the angle there.
             corner: [core::f64::consts::FRAC_1_SQRT_2 * corner; 2],
             surface: |angle: f64| {
                 let half = (0.5 * angle).sin();
@@ -385,7 +386,8 @@ impl Mesh {
         pole.mesh(&angles, shell)
     }
 
-    /// A cylinder of one region, its lower end [`Boundary::Contact`], its upper [`Boundary::Base`].
+    /// A cylinder of one region. Its lower end is [`Boundary::Contact`], its upper end
+    /// [`Boundary::Base`].
     pub(crate) fn cylinder(r_lines: &[f64], z_lines: &[f64]) -> Self {
         let mut builder = MeshBuilder::default();
         builder.rectangle(r_lines, z_lines, 0);
@@ -403,11 +405,11 @@ impl Mesh {
         mesh
     }
 
-    /// A cone whose tip is at the origin: its side [`Boundary::Contact`], its flat end at z =
-    /// `height` [`Boundary::Base`].
+    /// A cone with its tip at the origin. Its side is [`Boundary::Contact`], and its flat end at
+    /// z = `height` is [`Boundary::Base`].
     ///
-    /// Around a core of quadrilaterals at the tip lie shells that meet the axis at right angles and
-    /// flatten towards the base.
+    /// A core of quadrilaterals at the tip is surrounded by shells that meet the axis at right
+    /// angles and become flat towards the base.
     pub(crate) fn cone(half_angle: f64, height: f64, size: ContactMesh) -> Self {
         let m = size.count;
         let (sin, cos) = half_angle.sin_cos();
@@ -418,7 +420,7 @@ impl Mesh {
         let mut distances = vec![start];
         grow(&mut distances, first, size.growth, largest, side);
         // Height on the axis of the shell at a distance along the side: the distance itself near
-        // the tip, the cone's at its end.
+        // the tip, and the height of the cone at its end.
         let on_axis = |s: f64| s / (1.0 + s / side * (1.0 / cos - 1.0));
         let shell = |s: f64, k: usize| -> [f64; 2] {
             let v = 1.0 - k as f64 / (4 * m) as f64;
@@ -433,7 +435,7 @@ impl Mesh {
             elements: m,
             core: size.inner,
             axis: [0.0, axis],
-            // On the middle of the shell between the core's ends and the first.
+            // Halfway between the shell at the ends of the core and the first shell.
             corner: shell(size.inner + 0.5 * first, 2 * m),
             surface: |s: f64| [s * sin, s * cos],
             height,
@@ -441,8 +443,8 @@ impl Mesh {
         pole.mesh(&with_middles(&distances), shell)
     }
 
-    /// Bonded layers below z = 0, the first on top, of thicknesses `thickness` and radius `radius`.
-    /// a region each.
+    /// Bonded layers below z = 0, the first on top, with thicknesses `thickness` and radius
+    /// `radius`. Each layer is a region.
     pub(crate) fn layered_disc(
         thickness: &[f64],
         r_lines: &[f64],
@@ -475,34 +477,34 @@ impl Mesh {
     }
 }
 
-/// Lines of the cross-section: where its elements end.
+/// Lines of the cross-section, at which elements end.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct BlockMesh {
     pub block_height: f64,
     pub block_radius: f64,
     pub disc_radius: f64,
-    /// Thickness of the guide's layers, that on the block first.
+    /// Thicknesses of the guide's layers, the one on the block first.
     pub layers: Vec<f64>,
     pub inclusion: Option<InclusionSize>,
     /// Whether guide and block share the nodes of their interface.
     pub bonded: bool,
-    /// Elements along an eighth of the inclusion's circumference. Everything else follows.
+    /// Elements along an eighth of the inclusion's circumference, which determines all other sizes.
     pub fineness: usize,
 }
 
-/// The guide's mesh and the block's. Bonded, both in the first.
+/// The meshes of guide and block. If they are bonded, both are in the first.
 pub(crate) struct BlockMeshes {
     pub guide: Mesh,
     pub block: Option<Mesh>,
 }
 
 impl BlockMesh {
-    /// Box around the inclusion that takes a grid of its own: radius, lower and upper height.
+    /// Box around the inclusion with its own grid: radius, lower and upper height.
     fn cell(&self) -> Option<(InclusionSize, [f64; 3])> {
         let inclusion = self.inclusion?;
         let ([radius, half_height], depth) = (inclusion.half_axes, inclusion.depth);
         let bottom = depth + 2.0 * half_height;
-        // Margins of the size of the ellipse's elements, where there is room.
+        // Margins of the size of the ellipse's elements, if there is space.
         let margin = |half_axis: f64, room: f64| (0.4 * half_axis).min(0.5 * room);
         let cell = [
             radius + margin(radius, self.disc_radius - radius),
@@ -514,11 +516,11 @@ impl BlockMesh {
 
     pub(crate) fn build(&self) -> BlockMeshes {
         let cell = self.cell();
-        // Elements of the guide's face from the axis to its rim, finest at the rim where the
+        // Elements of the guide's face from the axis to its rim, finest at the rim, where the
         // traction is singular.
         let face = self.disc_radius / (2.5 * self.fineness as f64);
         let inner = cell.map_or(0.5 * self.disc_radius, |(_, [radius, _, _])| radius);
-        // Above a wide inclusion the pressure wants elements no longer than elsewhere.
+        // Above a wide inclusion, elements must not be longer than elsewhere.
         let n = self.fineness.max((inner / face).ceil() as usize);
         let shortest = if self.bonded {
             0.0
@@ -598,8 +600,8 @@ impl BlockMesh {
         let (stage, disc) = (self.block_height, self.disc_radius);
         let is_bonded = self.bonded;
         mesh.name_outer_edges(|[r, z]| {
-            // Positions come from the same expressions as the limits: rounding alone tells them
-            // apart.
+            // The positions come from the same expressions as the limits, so they differ only by
+            // rounding.
             if z <= glass * (1.0 - 1e-9) {
                 Boundary::Base
             } else if z >= stage * (1.0 - 1e-9) {
@@ -613,8 +615,8 @@ impl BlockMesh {
     }
 }
 
-/// The box [0, r] × [low, high] with the inclusion: a core rectangle, shells to the ellipse, shells
-/// to the box. Regions: `region` outside, `region + 1` inside.
+/// The box [0, r] × [low, high] with the inclusion: a core rectangle, shells to the ellipse, and
+/// shells to the box. The region is `region` outside and `region + 1` inside.
 fn add_cell(
     builder: &mut MeshBuilder,
     inclusion: InclusionSize,
@@ -624,10 +626,10 @@ fn add_cell(
 ) {
     let [radius, half_height] = inclusion.half_axes;
     let centre = inclusion.depth + half_height;
-    // A core of half the size leaves elements of about one size.
+    // A core of half the size leaves elements of similar size.
     let core = [0.5 * radius, 0.5 * half_height];
     let total = 4 * n;
-    // Node k of 8n + 1 along the three sides of a box from its lower end on the axis.
+    // Node k of 8n + 1 along the three sides of a box, from its lower end on the axis.
     let along_box = |k: usize, width: f64, low: f64, high: f64| -> [f64; 2] {
         let t = k as f64 / (2 * n) as f64;
         if t <= 1.0 {
@@ -639,7 +641,7 @@ fn add_cell(
         }
     };
     let on_core = |k: usize| {
-        // Sides bulge towards the ellipse, which opens the angles at the corners.
+        // The sides bulge towards the ellipse, which opens the angles at the corners.
         let [r, z] = along_box(k, core[0], -core[1], core[1]);
         let bulge = 0.15 * (1.0 - (r / core[0]).powi(2)) + 0.15 * (1.0 - (z / core[1]).powi(2));
         let scale = 0.9 * (1.0 + bulge);

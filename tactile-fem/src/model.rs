@@ -1,10 +1,5 @@
-//! Bodies, materials, supports and contacts: what is to be solved.
-//!
-//! The unknowns of a model.
-//!
-//! An interface whose nodes the bodies share.
-//!
-//! Rigid bodies of revolution.
+//! The model to be solved: bodies, materials, supports, contacts and unknowns, interfaces with
+//! shared nodes, and rigid bodies of revolution.
 
 use crate::element::{ALL, ElementGeometry};
 use crate::material::{Kinematics, Material};
@@ -20,21 +15,21 @@ use tactile_elasticity::{ElasticityError, Quantity};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct BodyIndex(usize);
 
-/// How a boundary is held.
+/// Support of a boundary.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Support {
-    /// No displacement but the support's own: glued to glass or to a stage.
+    /// Displaced with the support only: glued to glass or to a stage.
     Bonded,
-    /// Free to slide along r: a lubricated stage, or a plane of symmetry.
+    /// Free to slide along r: on a lubricated stage, or in a plane of symmetry.
     Sliding,
 }
 
-/// What a displacement component does.
+/// Motion of a displacement component.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum DofMotion {
     Free,
     Zero,
-    /// Moves by the approach times this.
+    /// Displaced by the approach times this factor.
     Driven(f64),
 }
 
@@ -46,31 +41,31 @@ pub(crate) struct Part {
 
 /// An axisymmetric problem: bodies with their materials, supports and contacts.
 ///
-/// The approach δ, one number, moves every boundary that is [driven](Self::drive) by δ along +z. SI
-/// units. The axis of revolution is r = 0. Guides lie below z = 0 and objects above.
+/// The approach δ, one number, moves every [driven](Self::drive) boundary by δ along +z. SI units
+/// are used, and the axis of revolution is r = 0. Guides are below z = 0 and objects above.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ElementModel {
     pub kinematics: Kinematics,
     pub nodes: Vec<[f64; 2]>,
     pub elements: Vec<[usize; 9]>,
-    /// Material of each element, an index of `materials`.
+    /// Material of each element, as an index of `materials`.
     pub regions: Vec<usize>,
-    /// Shared by the scenes on one mesh whose nodes are moved elsewhere only.
+    /// Geometry of each element, shared by scenes on one mesh with partly moved nodes.
     pub geometry: Vec<Arc<ElementGeometry>>,
     pub materials: Vec<Material>,
     pub parts: Vec<Part>,
-    /// Of each displacement component, 2 node + (0 for r, 1 for z).
+    /// Motion of each displacement component, 2 node + (0 for r, 1 for z).
     pub motion: Vec<DofMotion>,
     pub opposites: Vec<Opposite>,
     pub segments: Vec<ContactSegment>,
     pub contact_nodes: Vec<ContactNode>,
     /// Whether contacts stick.
     pub sticks: bool,
-    /// A bonded interface whose pressure is wanted.
+    /// A bonded interface whose pressure is evaluated.
     pub interface: Option<BondedInterface>,
-    /// The node whose axial displacement a node shares.
+    /// The node with which each node shares its axial displacement.
     pub partners: Vec<Option<usize>>,
-    /// External forces on displacement components, for tests by manufactured solutions.
+    /// External forces on displacement components, for tests with manufactured solutions.
     pub external: Vec<f64>,
 }
 
@@ -83,10 +78,11 @@ impl ElementModel {
         }
     }
 
-    /// Adds a body with one material a region.
+    /// Adds a body with one material per region.
     ///
     /// # Errors
-    /// Materials that are not one a region. An element that is degenerate or turned inside out.
+    /// An error if the number of materials differs from that of regions, or if an element is
+    /// degenerate or inverted.
     pub(crate) fn add(
         &mut self,
         mesh: &Mesh,
@@ -137,7 +133,7 @@ impl ElementModel {
         &self.materials[self.parts[body.0].regions.clone()]
     }
 
-    /// Edges of a body's boundary, by the model's node numbers.
+    /// Edges of a body's boundary, with the node numbers of the model.
     pub(crate) fn edges(&self, body: BodyIndex, boundary: Boundary) -> &[[usize; 3]] {
         self.parts[body.0]
             .boundaries
@@ -145,7 +141,7 @@ impl ElementModel {
             .map_or(&[], Vec::as_slice)
     }
 
-    /// Regions of a body among the model's.
+    /// Regions of a body, numbered in the model.
     fn body_regions(&self, body: BodyIndex) -> core::ops::Range<usize> {
         self.parts[body.0].regions.clone()
     }
@@ -171,23 +167,23 @@ impl ElementModel {
         }
     }
 
-    /// Lets two bodies' [`Boundary::Contact`] touch without friction.
+    /// Lets the [`Boundary::Contact`] of two bodies touch without friction.
     ///
-    /// Gaps are measured from `first`, which had better be the one with the finer mesh or the more
-    /// convex of the two.
+    /// Gaps are measured from `first`, which should be the body with the finer mesh or the more
+    /// convex one.
     pub(crate) fn contact(&mut self, first: BodyIndex, second: BodyIndex) {
         let curve = SurfaceCurve::new(self.edges(second, Boundary::Contact), &self.nodes);
         let softer = self.softest(first).min(self.softest(second));
         self.add_points(first, Opposite::Surface(curve), softer);
     }
 
-    /// Lets two surfaces that touch from the start slide on each other without friction: nodes at
-    /// the same place share their axial displacement. The pressure on the second body's surface,
-    /// above the first, becomes the pressure of the states.
+    /// Lets two surfaces that touch from the start slide on each other without friction: coincident
+    /// nodes share their axial displacement. The pressure on the surface of the second body, above
+    /// the first, becomes the pressure of the states.
     ///
-    /// The nodes of one place do not stay at one radius: where the second body spreads more, the
-    /// first feels its pressure somewhat further in, which matters little where the first is the
-    /// stiffer. The surfaces are not let part.
+    /// Coincident nodes do not keep the same radius: if the second body spreads more, the first
+    /// gets its pressure slightly further inside, which matters little if the first is stiffer. The
+    /// surfaces cannot separate.
     pub(crate) fn slide(&mut self, first: BodyIndex, second: BodyIndex) {
         let nodes: Vec<usize> = self
             .edges(first, Boundary::Contact)
@@ -201,7 +197,8 @@ impl ElementModel {
                 let [s, w] = self.nodes[other];
                 let near = |node: &usize| {
                     let [r, z] = self.nodes[*node];
-                    // Meshes built on the same lines: rounding alone parts their nodes.
+                    // The meshes are built on the same lines, so their nodes differ only by
+                    // rounding.
                     (r - s).abs() + (z - w).abs() < 1e-9 * (1.0 + r)
                 };
                 self.partners[other] = nodes.iter().copied().find(near);
@@ -215,26 +212,27 @@ impl ElementModel {
         self.interface = Some(BondedInterface::new(&shared, &self.elements, is_upper, 1.0));
     }
 
-    /// Lets a body's [`Boundary::Contact`] touch a rigid body without friction, whose pole is at
-    /// z = 0: above it (`side` +1) one that does not move, below it (−1) one that moves by the
+    /// Lets the [`Boundary::Contact`] of a body touch a rigid body without friction. The pole of
+    /// the rigid body is at z = 0. Above (`side` +1) it is fixed; below (−1) it moves by the
     /// approach.
     pub(crate) fn contact_rigid(&mut self, body: BodyIndex, shape: RigidShape, side: f64) {
         let softer = self.softest(body);
         self.add_points(body, Opposite::Rigid { shape, side }, softer);
     }
 
-    /// Forbids slip in all contacts of the model, as with unlimited friction: what touches stays
-    /// where it first touched until it parts.
+    /// Forbids slip in all contacts of the model, as with unlimited friction: points that touch
+    /// stay together until they separate.
     ///
-    /// Loads are then followed in steps that let the approach grow by a tenth: forces hold to a
-    /// thousandth and contact radii to two, whatever loads are asked for on the way. At ν near 0
-    /// the radius is up to 1.5 % low: the pressure near the rim is not that of sliding.
+    /// Loads are then followed in steps with a growth of the approach by a tenth. Forces are
+    /// accurate to a thousandth and contact radii to two thousandths, independently of intermediate
+    /// loads. At ν near 0 the radius is up to 1.5 % low, because the pressure near the rim differs
+    /// from that of sliding.
     pub(crate) fn forbid_slip(&mut self) {
         self.sticks = true;
     }
 
-    /// Makes the pressure on a body's [`Boundary::Interface`], above its first `lower` regions, the
-    /// pressure of the states.
+    /// Makes the pressure on the [`Boundary::Interface`] of a body, above its first `lower`
+    /// regions, the pressure of the states.
     pub(crate) fn bond(&mut self, body: BodyIndex, lower: usize) {
         let first = self.body_regions(body).start;
         let edges = self.edges(body, Boundary::Interface);
@@ -265,11 +263,11 @@ pub(crate) struct ModelFields {
     pub displacement: Vec<f64>,
     pub pressures: Vec<[f64; 3]>,
     pub approach: f64,
-    /// Contact pressures per reference area kept by the augmented Lagrangian.
+    /// Contact pressures per reference area, stored by the augmented Lagrangian.
     pub multipliers: Vec<f64>,
-    /// Contact pressures per reference area, unknowns of their own as element pressures are.
+    /// Contact pressures per reference area, as independent unknowns like element pressures.
     pub contact: Vec<f64>,
-    /// Where contact nodes stick. Empty where surfaces slide.
+    /// Anchors of sticking contact nodes. Empty if surfaces slide.
     pub anchors: Vec<Option<Anchor>>,
 }
 
@@ -300,15 +298,15 @@ pub(crate) struct Equilibrium {
     pub force: f64,
 }
 
-/// Edges between bonded bodies and the elements on one of its sides.
+/// Edges between bonded bodies, with the elements on one side.
 #[derive(Debug, Clone)]
 pub(crate) struct BondedInterface {
     /// Nodes from the axis outwards.
     pub nodes: Vec<usize>,
     pub edges: Vec<[usize; 3]>,
-    /// Elements of one of the bodies that touch the interface.
+    /// Elements of one of the bodies at the interface.
     pub elements: Vec<usize>,
-    /// −1 where that body is the lower one: it is pushed down. +1 for the upper one.
+    /// −1 if this body is the lower one, which is pushed down, and +1 for the upper one.
     pub sign: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Scenes near a solved one, on the same mesh: derivatives by parameters.
+//! Scenes close to a solved one, on the same mesh: derivatives by parameters.
 
 use crate::element::{ElementGeometry, Elimination};
 use crate::material::Material;
@@ -16,7 +16,7 @@ impl FemScene {
     /// This scene with other materials and moved nodes.
     ///
     /// # Errors
-    /// An element would be turned inside out.
+    /// An error if an element would be inverted.
     pub fn changed(
         &self,
         materials: &[(usize, Material)],
@@ -32,8 +32,8 @@ impl FemScene {
         Ok(Self { model })
     }
 
-    /// The equations of this scene and of those [changed](Self::changed) from it, analysed. `None`
-    /// where there is no memory for them.
+    /// The analysed equations of this scene and of scenes [changed](Self::changed) from it. `None`
+    /// if there is not enough memory.
     fn layout(&self) -> Option<Layout> {
         let mut layout = Layout::new(&self.model);
         layout
@@ -42,7 +42,7 @@ impl FemScene {
         Some(layout)
     }
 
-    /// What solutions of nearby scenes start from. `None` where the tangent is singular.
+    /// The start of solutions of nearby scenes. `None` if the tangent is singular.
     fn neighbourhood<'a>(
         &'a self,
         layout: &mut Layout,
@@ -67,7 +67,7 @@ impl FemScene {
 pub struct FrameResponse {
     pressure: Vec<PressurePoint>,
     force: f64,
-    /// r and z of every node but the elements' centres.
+    /// r and z of each node except the elements' centres.
     displacement: Vec<f64>,
 }
 
@@ -77,18 +77,18 @@ impl FrameResponse {
         self.force
     }
 
-    /// Pressure at a radius of the interface, as [`State::pressure_at`].
+    /// Pressure at a radius of the interface, see [`State::pressure_at`].
     pub fn pressure_at(&self, radius_m: f64) -> f64 {
         pressure_at(&self.pressure, radius_m)
     }
 }
 
-/// Rounds in which the faces of slightly changed scenes are made to meet again: each leaves a tenth
-/// of the distance before.
+/// Number of rounds in which the faces of slightly changed scenes are realigned. Each leaves a
+/// tenth of the previous distance.
 const SLIDING_ROUNDS: usize = 2;
 
-/// A scene with an interface, solved at some approaches. Scenes near it on the same mesh are solved
-/// from it in fewer iterations, and it has derivatives by whatever changes a scene.
+/// A scene with an interface, solved at several approaches. Nearby scenes on the same mesh are
+/// solved from it in fewer iterations, and it gives derivatives by any change of a scene.
 ///
 /// ```
 /// use tactile_fem::{Block, FemScene, Guide, GuideLayer, Interface, Material, SolvedFrames};
@@ -98,7 +98,7 @@ const SLIDING_ROUNDS: usize = 2;
 /// let block = Block { height_m: 20e-3, radius_m: 30e-3, material: gel(1e4)?, lump: None };
 /// let scene = FemScene::block_under_guide(&block, &guide, Interface::Bonded)?;
 /// let solved = SolvedFrames::new(&scene, &[0.5e-3], None, None).unwrap();
-/// // The tissue, the region after the guide's one layer, stiffer by a thousandth.
+/// // The tissue, the region after the guide's single layer, becomes stiffer by a thousandth.
 /// let stiffer = gel(1.001e4)?;
 /// let changed = |scene: &FemScene| Some(vec![scene.changed(&[(1, stiffer)], None).ok()?]);
 /// let answers = solved.responses(changed, |_| vec![0.5e-3; 2]).unwrap();
@@ -108,18 +108,18 @@ const SLIDING_ROUNDS: usize = 2;
 /// ```
 #[derive(Debug, Clone)]
 pub struct SolvedFrames {
-    /// Of the mesh, however it is moved.
+    /// Layout of the mesh, which does not depend on the positions of its nodes.
     layout: Layout,
-    /// One for all frames. Where surfaces slide, one a frame.
+    /// One scene for all frames, or one per frame if surfaces slide.
     scenes: Vec<FemScene>,
     states: Vec<State>,
     sliding_depth: Option<f64>,
 }
 
 impl SolvedFrames {
-    /// Solves a scene at approaches in metres, from a solution nearby where there is one. Where the
-    /// mesh is to follow surfaces that slide, `sliding_depth_m` is how far below the surface it may
-    /// move. `None` where an approach is not reached.
+    /// Solves a scene at approaches in metres, starting from a nearby solution if there is one. If
+    /// the mesh must follow sliding surfaces, `sliding_depth_m` is the depth below the surface to
+    /// which it may move. `None` if an approach is not reached.
     pub fn new(
         scene: &FemScene,
         approaches_m: &[f64],
@@ -147,7 +147,8 @@ impl SolvedFrames {
             solved.states = solution.states;
             return (solution.report.outcome == Outcome::Solved).then_some(solved);
         };
-        // Frame by frame, each from the same frame of the solution nearby or from the frame before.
+        // Frame by frame, each from the same frame of the nearby solution or from the previous
+        // frame.
         for (frame, &approach) in approaches_m.iter().enumerate() {
             let before = || solved.scenes.last().zip(solved.states.last());
             let near = near.map(|near| (near.scene(frame), &near.states[frame]));
@@ -168,12 +169,13 @@ impl SolvedFrames {
     }
 
     /// Responses of changed scenes and, last, of the scene itself, each frame by frame, by one
-    /// iteration from the solution with its tangent: the error is of second order in the change.
+    /// iteration from the solution with its tangent. The error is of second order in the change.
     ///
-    /// `changed` makes the changed scenes of a frame's scene. `approaches_m` gives the approach of
-    /// each in a frame, and last that of the scene itself. One factorisation a frame, one residual
-    /// for each scene and frame. The iteration on the scene itself is for differences: it takes out
-    /// what the solution leaves unbalanced. `None` where an element is turned inside out.
+    /// `changed` creates the changed scenes of a frame's scene. `approaches_m` gives the approach
+    /// of each in a frame, and last that of the scene itself. The cost is one factorisation per
+    /// frame, and one residual per scene and frame. The iteration on the scene itself is used for
+    /// differences, because it cancels the residual imbalance of the solution. `None` if an element
+    /// is inverted.
     pub fn responses(
         &self,
         changed: impl Fn(&FemScene) -> Option<Vec<FemScene>>,
@@ -231,15 +233,15 @@ struct SolvedNeighbourhood<'a> {
 }
 
 impl SolvedNeighbourhood<'_> {
-    /// What is found of nearby scenes at their approaches, each by one iteration from the
-    /// state with its tangent: the error is of second order in the scenes' difference.
+    /// Responses of nearby scenes at their approaches, each by one iteration from the state with
+    /// its tangent. The error is of second order in the difference of the scenes.
     ///
-    /// Elements are evaluated anew only where they differ, and without their stiffness.
+    /// Elements are evaluated again only if they differ, and without their stiffness.
     ///
-    /// `None` where an element is turned inside out.
+    /// `None` if an element is inverted.
     fn solve(&self, nearby: &[(&FemScene, f64)]) -> Option<Vec<FrameResponse>> {
         let size = self.tangent.right.len();
-        // The last column is the answer to a unit approach.
+        // The last column is the solution for a unit approach.
         let mut columns = Vec::with_capacity((nearby.len() + 1) * size);
         let mut changes = Vec::with_capacity(nearby.len());
         for (scene, _) in nearby {
@@ -260,8 +262,8 @@ impl SolvedNeighbourhood<'_> {
         Some(found)
     }
 
-    /// The residual's change from this scene to a nearby one, taken from `right`, and the
-    /// eliminations of the elements that differ.
+    /// Subtracts the change of the residual from this scene to a nearby one from `right`. Returns
+    /// the eliminations of the elements that differ.
     fn change(&self, nearby: &ElementModel, right: &mut [f64]) -> Option<Vec<Option<Elimination>>> {
         let model = self.model;
         let mut changes = Vec::with_capacity(model.elements.len());
@@ -312,7 +314,7 @@ impl SolvedNeighbourhood<'_> {
         for (u, step) in fields.displacement.iter_mut().zip(&steps) {
             *u += step;
         }
-        // The pressures are read from the elements at the interface alone.
+        // The pressures are computed only from the elements at the interface.
         for &index in &interface.elements {
             let nodes = &nearby.elements[index];
             let outer = core::array::from_fn(|k| steps[2 * nodes[k / 2] + k % 2]);
@@ -331,10 +333,11 @@ impl SolvedNeighbourhood<'_> {
 }
 
 impl ElementModel {
-    /// Moves nodes, each by its index and position. Elements whose nodes stay keep their geometry.
+    /// Moves nodes, each given by index and position. Elements with unchanged nodes keep their
+    /// geometry.
     ///
     /// # Errors
-    /// An element would be turned inside out.
+    /// An error if an element would be inverted.
     pub(crate) fn move_nodes(
         &mut self,
         moved: impl Fn(usize, [f64; 2]) -> [f64; 2],

@@ -1,13 +1,10 @@
-//! Newton's method with load steps chosen by what converges.
+//! Newton's method with load steps that adapt to the convergence, and simplified Newton iterations.
 //!
-//! Equilibria by simplified Newton iterations.
-//!
-//! Simplified Newton iterations: with the tangent of an earlier iterate.
-//!
-//! An iteration then evaluates forces alone, a third of an element's work, and factorises nothing:
-//! about a fifth of a full one's time. It converges linearly, by a factor that is proportional to
-//! the distance from where the tangent was taken (P. Deuflhard, *Newton Methods for Nonlinear
-//! Problems* (2004), §2.1.2), which for scenes near a solved one is small.
+//! Simplified Newton iterations use the tangent of an earlier iterate. Such an iteration only
+//! evaluates forces, a third of an element's work, and factorises nothing: it takes about a fifth
+//! of a full iteration's time. It converges linearly, by a factor proportional to the distance from
+//! the tangent's state (P. Deuflhard, *Newton Methods for Nonlinear Problems* (2004), §2.1.2),
+//! which is small for scenes close to a solved one.
 
 use crate::element::OUTER;
 use crate::material::Kinematics;
@@ -18,67 +15,69 @@ use crate::surface::Opposite;
 use crate::system::{Chord, Layout, Slot};
 use std::sync::Arc;
 
-/// First step there, over the load's approach: what touches within it slides. With 0.02 a
-/// thirtieth of friction's part is lost.
+/// First step for sticking surfaces, relative to the approach of the load: contacts that form
+/// within this step slide. With 0.02, a thirtieth of the effect of friction is lost.
 const STICK_FIRST_STEP: f64 = 0.002;
 
-/// Growth of the approach in one step where surfaces stick: where a node touches within a step is
-/// not known. With 1.2 the force of a ball depends on the loads before by a thousandth and its
-/// contact radius by four, with this by less than half of that (the test
+/// Growth of the approach per step for sticking surfaces: the time of touching within a step is
+/// unknown. With 1.2, the force of a ball depends on earlier loads by a thousandth and its contact
+/// radius by four thousandths; with this value, by less than half of that (test
 /// `more_loads_on_the_way_change_little`).
 const STICK_GROWTH: f64 = 1.1;
 
-/// Largest step of the approach there, over the bodies' height.
+/// Largest step of the approach for sticking surfaces, relative to the height of the bodies.
 const LARGEST_STEP: f64 = 0.08;
 
-/// Halvings of a load step before the solver stops.
+/// Maximum number of halvings of a load step.
 const MAX_HALVINGS: usize = 10;
 
-/// Imbalance at a guessed approach below which the force takes over.
+/// Imbalance at a guessed approach below which the force becomes the goal.
 const SWITCH_TO_FORCE: f64 = 1e-2;
 
-/// Part of a Newton step below which it is given up, where elements are turned inside out before.
+/// Minimum fraction of a Newton step. Below it the step is abandoned, because elements are
+/// inverted.
 const SHORTEST_STEP: f64 = 0.02;
 
-/// Iterations of a load step before it is halved. Steps that converge take three to ten.
+/// Maximum number of iterations of a load step before it is halved. Convergent steps take three to
+/// ten.
 const MAX_ITERATIONS: usize = 25;
 
-/// Change of the approach, relative, up to which the last tangent is tried.
+/// Relative change of the approach up to which the last tangent is tried.
 const NEAR: f64 = 0.02;
 
-/// Tangents on the way to an equilibrium: those that are reached take one to three.
+/// Maximum number of tangents on the way to an equilibrium. Successful ones take one to three.
 const MAX_TANGENTS: usize = 7;
 
-/// Iterations that may be left at the rate of the last one: more take longer than a new tangent
-/// and the two that then do.
+/// Maximum number of remaining iterations at the current rate. More would take longer than a new
+/// tangent with its two iterations.
 const MOST_LEFT: f64 = 6.0;
 
-/// First step of a contact, over the bodies' height.
+/// First step of a contact, relative to the height of the bodies.
 const FIRST_STEP: f64 = 1e-3;
-/// Growth of the approach in one step where two deformable surfaces slide on each other.
+/// Growth of the approach per step if two deformable surfaces slide on each other.
 const LARGEST_GROWTH: f64 = 3.0;
 
 struct Solver<'a> {
     model: &'a ElementModel,
     layout: &'a mut Layout,
     report: SolverReport,
-    /// The equilibrium before the last one, for extrapolation.
+    /// The previous equilibrium, for extrapolation.
     before: Option<Equilibrium>,
     last: Equilibrium,
 }
 
 impl ElementModel {
-    /// Solves for the loads in order, each starting from the one before.
+    /// Solves for the loads in order, each starting from the previous one.
     ///
-    /// A load that is not reached ends the solution: its [`SolverReport`] says so. O(n b²) for each
-    /// Newton iteration with n unknowns in a system of half-width b.
+    /// If a load is not reached, the solution ends there, as its [`SolverReport`] states. O(n b²)
+    /// per Newton iteration, with n unknowns in a system of half-width b.
     pub(crate) fn solve(&self, loads: &[AppliedLoad]) -> Solution {
         self.solve_near(&mut Layout::new(self), loads, &[])
     }
 
-    /// [`Self::solve`] that first tries, for each load, to go there from a guess: the state of a
-    /// model with the same elements at about that load. `layout` is this model's or one's with
-    /// the same elements and supports: its analysis is used again.
+    /// Like [`Self::solve`], but first tries to reach each load from a guess: the state of a model
+    /// with the same elements at a similar load. `layout` belongs to this model or to one with the
+    /// same elements and supports, and its analysis is reused.
     pub(crate) fn solve_near(
         &self,
         layout: &mut Layout,
@@ -123,7 +122,7 @@ impl ElementModel {
         }
     }
 
-    /// Height of all bodies together.
+    /// Total height of all bodies.
     fn height(&self) -> f64 {
         let heights = || self.nodes.iter().map(|node| node[1]);
         heights().fold(f64::NEG_INFINITY, f64::max) - heights().fold(f64::INFINITY, f64::min)
@@ -131,7 +130,7 @@ impl ElementModel {
 }
 
 impl Solver<'_> {
-    /// Goes to an approach from a guess. Whether that succeeded.
+    /// Goes to an approach from a guess. Returns whether it succeeded.
     fn jump(&mut self, guess: &State, load: AppliedLoad) -> bool {
         let AppliedLoad::Approach(approach) = load else {
             return false;
@@ -157,9 +156,9 @@ impl Solver<'_> {
         reached && self.advance(load) && self.augment(load)
     }
 
-    /// Goes towards an approach, which may change on the way, in steps that two deformable surfaces
-    /// take, or surfaces that stick: a contact that grows manyfold in one step does not settle, or
-    /// slides where it should stick.
+    /// Goes towards an approach, which may change on the way, in steps suitable for two deformable
+    /// surfaces or for sticking surfaces: a contact that grows manyfold in one step does not
+    /// converge, or slides although it should stick.
     fn walk(&mut self, target: impl Fn(&Self) -> f64) -> bool {
         let (growth, first_part) = match (self.model.sticks, self.slides()) {
             (true, _) => (STICK_GROWTH, STICK_FIRST_STEP),
@@ -175,7 +174,7 @@ impl Solver<'_> {
                 return true;
             }
             if !self.advance(AppliedLoad::Approach(next)) {
-                // Rounding may hide a first approach as small as this from the penalty.
+                // Rounding may hide such a small first approach from the penalty.
                 if here != 0.0 || first >= FIRST_STEP * height {
                     return false;
                 }
@@ -190,10 +189,10 @@ impl Solver<'_> {
         self.model.kinematics == Kinematics::Finite && self.model.opposites.iter().any(surface)
     }
 
-    /// Approaches until bodies that had a gap between them press on each other.
+    /// Increases the approach until bodies with a gap press on each other.
     fn touch(&mut self, force: f64) -> bool {
-        // A small part of the bodies' height: the first contact is made in some steps of twice the
-        // size before.
+        // A small fraction of the height of the bodies. The first contact is found in several
+        // steps, each twice the previous one.
         let mut step = FIRST_STEP * self.model.height();
         for _ in 0..12 {
             if self.last.force.abs() > 1e-6 * force.abs() || force == 0.0 {
@@ -230,7 +229,7 @@ impl Solver<'_> {
                     if done {
                         return true;
                     }
-                    // `fraction` is of what is left: this doubles the step.
+                    // `fraction` refers to the remainder: this doubles the step.
                     fraction = (2.0 * fraction / (1.0 - fraction)).min(1.0);
                 }
                 None => {
@@ -252,7 +251,8 @@ impl Solver<'_> {
         }
     }
 
-    /// Equilibrium at the goal, from an extrapolation of the last two, else from the last.
+    /// Equilibrium at the goal, starting from an extrapolation of the last two equilibria or from
+    /// the last one.
     fn equilibrium(&mut self, goal: AppliedLoad) -> Option<Equilibrium> {
         if let Some(guess) = self.extrapolated(goal)
             && let Some(found) = self.newton(guess, goal)
@@ -264,7 +264,7 @@ impl Solver<'_> {
 
     fn extrapolated(&self, goal: AppliedLoad) -> Option<ModelFields> {
         if self.slides() {
-            // Nodes that came into contact since do not go on as they did.
+            // Nodes that came into contact since then behave differently.
             return None;
         }
         let before = self.before.as_ref()?;
@@ -273,7 +273,7 @@ impl Solver<'_> {
             AppliedLoad::Approach(target) | AppliedLoad::Force(target) => target,
         };
         let ratio = (target - to) / (to - from);
-        // Farther than three steps back reach, a linear extrapolation is worse than none.
+        // Beyond three times the last step, a linear extrapolation is worse than none.
         if ratio.is_nan() || ratio.abs() > 3.0 || before.fields.approach == 0.0 {
             return None;
         }
@@ -292,7 +292,7 @@ impl Solver<'_> {
         })
     }
 
-    /// Equilibrium at the goal. Without contacts by simplified Newton iterations where they
+    /// Equilibrium at the goal. Models without contacts use simplified Newton iterations if they
     /// converge.
     fn newton(&mut self, start: ModelFields, goal: AppliedLoad) -> Option<Equilibrium> {
         if let (AppliedLoad::Approach(to), true) = (goal, self.model.contact_nodes.is_empty()) {
@@ -307,8 +307,8 @@ impl Solver<'_> {
         let model = self.model;
         let wanted = goal;
         let mut fields = start;
-        // A force is reached at a guessed approach first: the tangent of a contact that has only
-        // begun is no guide to where a force will be.
+        // A force is first approached at a guessed approach, because the tangent of a contact that
+        // has only started is a poor guide.
         let mut goal = match goal {
             AppliedLoad::Force(force) => AppliedLoad::Approach(self.approach_for(force)),
             AppliedLoad::Approach(_) => goal,
@@ -337,7 +337,7 @@ impl Solver<'_> {
                     });
                 }
             }
-            // Six iterations without gain: a shorter load step is worth more.
+            // After six iterations without gain, a shorter load step is better.
             if iteration % 6 == 5 {
                 if imbalance > worst {
                     return None;
@@ -350,7 +350,7 @@ impl Solver<'_> {
             (fields, system) = loop {
                 let mut trial = step.apply(&fields, length);
                 if let (AppliedLoad::Approach(target), true) = (goal, length == 1.0) {
-                    // Free of the rounding of the sum.
+                    // Avoids the rounding of the sum.
                     trial.approach = target;
                 }
                 if let Some(next) = model.assemble(self.layout, &trial, margin(goal, &trial)) {
@@ -371,7 +371,7 @@ impl Solver<'_> {
         if !(force / last > 0.0 && here != 0.0) {
             return here;
         }
-        // Hertz's exponent where only one equilibrium is known, one without contact.
+        // Hertz's exponent if only one equilibrium is known, one if there is no contact.
         let guess = if self.model.contact_nodes.is_empty() {
             1.0
         } else {
@@ -388,7 +388,7 @@ impl Solver<'_> {
         here * (force / last).powf(1.0 / exponent)
     }
 
-    /// Updates the contact multipliers at the last equilibrium and balances again.
+    /// Updates the contact multipliers at the last equilibrium and restores equilibrium.
     fn augment(&mut self, load: AppliedLoad) -> bool {
         if self.model.contact_nodes.is_empty() {
             return true;
@@ -405,8 +405,8 @@ impl Solver<'_> {
     }
 }
 
-/// Equilibrium at an approach, of a model without contacts. `None` where iterations do not
-/// converge. A new tangent is taken only where those with the last one of `layout` converge slowly.
+/// Equilibrium at an approach for a model without contacts. `None` if the iterations do not
+/// converge. A new tangent is computed only if those with the last one of `layout` converge slowly.
 fn simplified(
     model: &ElementModel,
     layout: &mut Layout,
@@ -441,33 +441,33 @@ fn simplified(
     None
 }
 
-/// Unbalanced force over element forces at which an equilibrium counts as reached: four digits
-/// below what the forces are wanted to, and well above rounding.
+/// Unbalanced force relative to the element forces at which an equilibrium is accepted: four digits
+/// below the required accuracy of forces, and well above rounding.
 const TOLERANCE: f64 = 1e-8;
 
-/// How iterations with one tangent end.
+/// Result of iterations with one tangent.
 enum Ending {
     Balanced(Equilibrium),
-    /// They converge no longer, or not fast: the iterate from which a new tangent is to be taken.
+    /// They diverge or converge slowly: the iterate at which a new tangent is computed.
     Slow(ModelFields),
 }
 
-/// Forces out of balance at some displacements.
+/// Unbalanced forces at given displacements.
 struct Unbalanced {
-    /// Negative residual of the equations, the elements' centres eliminated.
+    /// Negative residual of the equations, with the elements' centres eliminated.
     right: Vec<f64>,
     /// Residual of each element's centre.
     centres: Vec<[f64; 2]>,
-    /// Pressures that would balance each element's volume.
+    /// Equilibrium pressures of each element.
     pressures: Vec<[f64; 3]>,
     /// Derivative of the energy by the approach.
     force: f64,
-    /// Over the root of the sum of squared element forces.
+    /// Relative to the root of the sum of squared element forces.
     imbalance: f64,
 }
 
 impl Chord {
-    /// Iterates from `start` at an approach as long as that converges fast.
+    /// Iterates from `start` at an approach as long as the iterations converge fast.
     fn iterate(
         &self,
         model: &ElementModel,
@@ -477,9 +477,9 @@ impl Chord {
         iterations: &mut usize,
     ) -> Ending {
         let mut fields = start;
-        // A full step of Newton's method may raise the imbalance on its way to the solution.
+        // A full Newton step may raise the imbalance on its way to the solution.
         let mut may_rise = is_new;
-        // The iterate before and its imbalance.
+        // The previous iterate and its imbalance.
         let mut before: Option<(ModelFields, f64)> = None;
         loop {
             let unbalanced = self.unbalanced(model, &fields);
@@ -492,7 +492,7 @@ impl Chord {
                     return Ending::Slow(before);
                 }
                 may_rise = false;
-                // At this rate.
+                // Number of remaining iterations at this rate.
                 let left = (TOLERANCE / imbalance).ln() / rate.ln();
                 if !(rate < 1.0 && left < MOST_LEFT) {
                     return Ending::Slow(fields);
@@ -512,13 +512,13 @@ impl Chord {
             let Some(next) = self.step(model, &fields, &unbalanced, approach) else {
                 return Ending::Slow(fields);
             };
-            // Forces at another approach say nothing of the iterates there.
+            // Forces at another approach give no rate for the iterates there.
             before = is_there.then_some((fields, imbalance));
             fields = next;
         }
     }
 
-    /// `None` where an element is turned inside out.
+    /// `None` if an element is inverted.
     fn unbalanced(&self, model: &ElementModel, fields: &ModelFields) -> Option<Unbalanced> {
         let mut found = Unbalanced {
             right: vec![0.0; self.by_approach.len()],

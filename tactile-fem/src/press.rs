@@ -1,6 +1,4 @@
-//! Soft layers on glass: what objects are pressed on.
-//!
-//! Objects pressed on a guide or on a rigid flat.
+//! Presses of objects on a rigid flat or on a guide of soft layers on glass.
 
 use crate::material::{Kinematics, Material};
 use crate::mesh::{Boundary, ContactMesh, Mesh};
@@ -25,11 +23,12 @@ use tactile_elasticity::{ElasticityError, Quantity};
 pub struct GuideLayer {
     /// Thickness, in metres.
     pub thickness_m: f64,
-    /// What it is made of.
+    /// Material of the layer.
     pub material: Material,
 }
 
-/// A soft guide: bonded layers, the first towards the object, the last bonded to rigid glass.
+/// A soft guide: bonded layers, starting on the side of the object, with the last one bonded to
+/// rigid glass.
 ///
 /// ```
 /// use tactile_fem::{Guide, GuideLayer, Material};
@@ -54,10 +53,11 @@ pub struct Guide {
 }
 
 impl Guide {
-    /// Layers from the object's side to the glass, and the guide's radius in metres.
+    /// Creates a guide from its layers, starting on the side of the object, and its radius in
+    /// metres.
     ///
     /// # Errors
-    /// No layer. A thickness or a radius that is not positive.
+    /// An error for no layer, and for a thickness or a radius that is not positive.
     pub fn new(layers: Vec<GuideLayer>, radius_m: f64) -> Result<Self, ElasticityError> {
         Quantity::Radius.positive(radius_m)?;
         Quantity::Layers.at_least(layers.len(), 1)?;
@@ -67,12 +67,12 @@ impl Guide {
         Ok(Self { layers, radius_m })
     }
 
-    /// The layers, from the object's side.
+    /// The layers, starting on the side of the object.
     pub fn layers(&self) -> &[GuideLayer] {
         &self.layers
     }
 
-    /// Its radius, in metres.
+    /// Radius in metres.
     pub fn radius_m(&self) -> f64 {
         self.radius_m
     }
@@ -86,8 +86,8 @@ impl Guide {
     }
 }
 
-/// A soft body of revolution that a sensor presses: its lowest point touches, its far side does not
-/// move.
+/// A soft body of revolution pressed against a sensor: its lowest point touches, and its far side
+/// is fixed.
 ///
 /// ```
 /// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
@@ -110,36 +110,37 @@ impl Guide {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum ObjectShape {
-    /// The half of a ball next to the contact. Its equator spreads freely in its plane, as where
-    /// the ball is pressed the same way from both sides.
+    /// The half of a ball next to the contact. Its equator spreads freely in its plane, as if the
+    /// ball were pressed equally from both sides.
     Ball {
-        /// Its radius, in metres.
+        /// Radius in metres.
         radius_m: f64,
     },
-    /// Half a ball whose flat side is glued to a stage.
+    /// A half ball whose flat side is glued to a stage.
     HalfBall {
-        /// Its radius, in metres.
+        /// Radius in metres.
         radius_m: f64,
     },
-    /// A cylinder whose far end is glued to a stage. Wider than the guide, a flat plate.
+    /// A cylinder whose far end is glued to a stage. If it is wider than the guide, it is a flat
+    /// plate.
     Cylinder {
-        /// Its radius, in metres.
+        /// Radius in metres.
         radius_m: f64,
-        /// Its height, in metres.
+        /// Height in metres.
         height_m: f64,
     },
-    /// A cone, its tip towards the sensor, whose base is glued to a stage. On a soft guide one
-    /// sharper than about 1.1 rad ends early with [`Outcome::Stopped`](crate::Outcome::Stopped):
-    /// the strain at its tip has no bound.
+    /// A cone with its tip towards the sensor and its base glued to a stage. On a soft guide, one
+    /// sharper than about 1.1 rad ends early with [`Outcome::Stopped`](crate::Outcome::Stopped),
+    /// because the strain at its tip is unbounded.
     Cone {
-        /// Between its axis and its surface, in radians.
+        /// Angle between its axis and its surface, in radians.
         half_angle_rad: f64,
-        /// From its tip to its base, in metres.
+        /// Distance from its tip to its base, in metres.
         height_m: f64,
     },
 }
 
-/// Whether two surfaces that are pressed together slide.
+/// Whether two surfaces pressed together slide.
 ///
 /// ```
 /// use tactile_fem::{Block, Guide, Interface, GuideLayer, AppliedLoad, Material, FemScene};
@@ -156,15 +157,15 @@ pub enum ObjectShape {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Interface {
-    /// The two move together, from the start or from where they first touch.
+    /// The surfaces move together, from the start or from where they first touch.
     Bonded,
-    /// They slide on each other. A guide and a block are not let part: the pressure is positive
-    /// where they press.
+    /// The surfaces slide on each other. A guide and a block cannot separate; their pressure is
+    /// positive in compression.
     Frictionless,
 }
 
-/// An [`ObjectShape`] pressed on a rigid flat or on a [`Guide`], without friction unless asked for,
-/// with the fineness of its mesh.
+/// An [`ObjectShape`] pressed on a rigid flat or on a [`Guide`], by default without friction, with
+/// the fineness of its mesh.
 ///
 /// ```
 /// use tactile_fem::{Guide, GuideLayer, AppliedLoad, Material, ObjectShape, ObjectPress};
@@ -188,7 +189,7 @@ pub enum Interface {
 /// let force = |scene: &tactile_fem::FemScene| {
 ///     scene.solve(&[AppliedLoad::Approach(0.5e-3)]).states[0].force_n()
 /// };
-/// // Both meshes are fine enough for half a percent of the force.
+/// // Both meshes are fine enough for half a per cent of the force.
 /// assert!((force(&coarse) / force(&fine) - 1.0).abs() < 5e-3);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -201,8 +202,8 @@ pub struct ObjectPress {
     fineness: usize,
 }
 
-/// Elements across the core of a contact, 0.06 radii of a ball: with five the contact radius of a
-/// ball on a flat is within 0.2 % from a/R = 0.15 on, with ten the time is four times as long
+/// Number of elements across the core of a contact, 0.06 radii of a ball. With five, the contact
+/// radius of a ball on a flat is within 0.2 % from a/R = 0.15 on; ten take four times as long
 /// (`cargo bench -p tactile-benches --features fem --bench finite_elements`).
 const FINENESS: usize = 5;
 
@@ -210,7 +211,7 @@ impl ObjectPress {
     /// An object of one material on a rigid flat.
     ///
     /// # Errors
-    /// Lengths that are not positive. A cone's angle not between 0 and π/2.
+    /// An error for lengths that are not positive, and for a cone's angle not between 0 and π/2.
     pub fn new(object: ObjectShape, material: Material) -> Result<Self, ElasticityError> {
         object.check()?;
         Ok(Self {
@@ -222,9 +223,9 @@ impl ObjectPress {
         })
     }
 
-    /// On this guide instead of a rigid flat. Contact radii reach 1.3 ball radii and more, until
-    /// the ball's equator or the guide's thickness ends what the bodies take: the solution then
-    /// ends with [`Outcome::Stopped`](crate::Outcome::Stopped).
+    /// Uses this guide instead of a rigid flat. Contact radii reach 1.3 ball radii and more, until
+    /// the equator of the ball or the thickness of the guide is the limit: the solution then ends
+    /// with [`Outcome::Stopped`](crate::Outcome::Stopped).
     ///
     /// ```
     /// use tactile_fem::{AppliedLoad, Guide, GuideLayer, Material, ObjectPress, ObjectShape};
@@ -236,7 +237,7 @@ impl ObjectPress {
     ///     ObjectPress::new(ObjectShape::Ball { radius_m: 3e-3 }, Material::new(103e3, 0.495)?)?
     ///         .on_guide(guide)?;
     /// let state = &press.scene()?.solve(&[AppliedLoad::Approach(1e-3)]).states[0];
-    /// // Softer than a rigid flat: less force, at the same approach, than six tenths of Hertz's.
+    /// // Softer than a rigid flat: at the same approach the force is below six tenths of Hertz's.
     /// let hertz =
     ///     4.0 / 3.0 * 103e3 / (1.0 - 0.495 * 0.495) * 3e-3_f64.sqrt() * 1e-3_f64.powf(1.5);
     /// assert!(state.force_n() > 0.0 && state.force_n() < 0.6 * hertz);
@@ -245,8 +246,8 @@ impl ObjectPress {
     /// ```
     ///
     /// # Errors
-    /// [`ElasticityError::OutOfRange`] for a guide that is not wider than the object, unless this
-    /// is a cylinder.
+    /// [`ElasticityError::OutOfRange`] for a guide that is not wider than the object, unless the
+    /// object is a cylinder.
     pub fn on_guide(mut self, guide: Guide) -> Result<Self, ElasticityError> {
         let radius = self.object.radius_m();
         let may_cover = matches!(self.object, ObjectShape::Cylinder { .. });
@@ -257,9 +258,9 @@ impl ObjectPress {
         Ok(self)
     }
 
-    /// Whether what touches slides, as it does by default, or sticks ([`Interface::Bonded`]):
-    /// points that have come into contact stay opposite to each other until they part. The time
-    /// grows several times, as loads are followed in short steps.
+    /// Sets whether surfaces in contact slide, the default, or stick ([`Interface::Bonded`]):
+    /// touching points then stay together until they separate. This takes several times longer,
+    /// because loads are followed in short steps.
     ///
     /// ```
     /// use tactile_fem::{Interface, AppliedLoad, Material, ObjectShape, ObjectPress};
@@ -274,7 +275,7 @@ impl ObjectPress {
     ///         scene.solve(&[AppliedLoad::Approach(0.1e-3)]).states[0].force_n(),
     ///     )
     /// };
-    /// // Without slip a ball on a rigid flat is stiffer by a few per cent, the more the smaller ν.
+    /// // Without slip a ball on a rigid flat is stiffer by a few per cent, more for smaller ν.
     /// let ratio = force(Interface::Bonded)? / force(Interface::Frictionless)?;
     /// assert!(1.01 < ratio && ratio < 1.05, "{ratio}");
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -284,8 +285,8 @@ impl ObjectPress {
         self
     }
 
-    /// The number of elements across the middle of the contact (default 5). Elements elsewhere
-    /// follow. Time grows with its square.
+    /// Sets the number of elements across the middle of the contact (default 5). Other elements
+    /// scale with it. The time grows with its square.
     ///
     /// # Errors
     /// [`ElasticityError::OutOfRange`] below 2.
@@ -298,7 +299,8 @@ impl ObjectPress {
         Ok(self)
     }
 
-    /// The model of it: the object's far side stays, the glass or the flat moves by the approach.
+    /// The finite-element model: the far side of the object is fixed, and the glass or flat moves
+    /// by the approach.
     pub(crate) fn model(&self) -> Result<ElementModel, ElasticityError> {
         let mut model = ElementModel::new(Kinematics::Finite);
         let object = model.add(&self.object_mesh(), &[self.material])?;
@@ -312,7 +314,7 @@ impl ObjectPress {
             Some(guide) => {
                 let disc = model.add(&self.guide_mesh(guide), &guide.materials())?;
                 model.drive(disc, Boundary::Base, Support::Bonded);
-                // Every point that gaps are measured from must have something opposite to it.
+                // Each point from which gaps are measured must have something opposite to it.
                 if guide.radius_m() > self.object.radius_m() {
                     model.contact(object, disc);
                 } else {
@@ -342,8 +344,8 @@ impl ObjectPress {
         }
     }
 
-    /// Growth from element to element that is `growth` at the default fineness: over the same
-    /// length it is the same at any.
+    /// Growth factor between elements that equals `growth` at the default fineness, and gives the
+    /// same total growth over a length at any fineness.
     fn growth(&self, growth: f64) -> f64 {
         growth.powf(FINENESS as f64 / self.fineness as f64)
     }
@@ -367,12 +369,12 @@ impl ObjectPress {
         }
     }
 
-    /// Element at a cylinder's rim, where the pressure is singular, over a length.
+    /// Element size at the rim of a cylinder, where the pressure is singular, relative to a length.
     fn at_rim(&self, length: f64) -> f64 {
         0.1 * length / self.fineness as f64
     }
 
-    /// Lines from the axis to a cylinder's rim, densest there.
+    /// Lines from the axis to the rim of a cylinder, densest at the rim.
     fn rim_lines(&self, radius: f64) -> Vec<f64> {
         let mut lines = graded(radius, 0.0, self.at_rim(radius), self.growth(1.25));
         lines.reverse();
@@ -390,7 +392,7 @@ impl ObjectPress {
                 let size = self.size();
                 let radius = self.object.radius_m();
                 let largest = 0.15 * radius * FINENESS as f64 / self.fineness as f64;
-                // The contact may grow to about the ball's own radius; beyond, elements grow
+                // The contact may grow to about the radius of the ball; outside, elements grow
                 // freely.
                 let end = (1.3 * radius).min(0.5 * (radius + guide.radius_m()));
                 let lines = contact_lines(size.inner, size.count, size.growth, largest, end);

@@ -1,13 +1,13 @@
-//! Smooth pressures and the contact radius from the forces at a contact's nodes.
+//! Smooth pressures and the contact radius from the nodal forces of a contact.
 //!
-//! Pressures of neighbouring nodes, the ends and the middles of quadratic edges, alternate about
-//! the true ones, by some percent near the contact's edge. What they carry by the hat functions of
-//! the edges' ends, displacements that the elements can make, is in equilibrium with the bodies and
-//! does not: these are means of the true pressure, whose squares lie nearly on a straight line over
-//! r².
+//! Pressures of neighbouring nodes, the ends and midpoints of quadratic edges, alternate about the
+//! true pressure, by several per cent near the edge of the contact. Weighted by the hat functions
+//! of the edges' ends, which are possible displacements of the elements, the forces are in
+//! equilibrium with the bodies and do not alternate: they are means of the true pressure, whose
+//! squares lie nearly on a straight line over r².
 //!
-//! Pressures of a state: on a contact from its multipliers, on a bonded interface from the
-//! elements' forces.
+//! The pressures of a state come from the multipliers of a contact, or from the element forces at a
+//! bonded interface.
 
 use crate::element::{GAUSS3, quadratic};
 use crate::model::{BondedInterface, ElementModel, ModelFields};
@@ -15,18 +15,18 @@ use core::f64::consts::{PI, TAU};
 use nalgebra::DVector;
 use std::collections::BTreeMap;
 
-/// Intervals of Simpson's rule, which is then exact to nearly rounding.
+/// Intervals of Simpson's rule, which is then accurate nearly to rounding.
 const SIMPSON_INTERVALS: i32 = 16;
 
-/// Outermost edge ends left out of the fit: the contact's edge lies somewhere within the last
-/// element, whose pressures and half of its neighbour's are bent by it.
+/// Number of outermost edge ends excluded from the fit: the edge of the contact is within the last
+/// element, which distorts its pressures and half of its neighbour's.
 const LEFT_OUT_LIMIT: usize = 2;
 
-/// Fewest means that two constants are fitted to.
+/// Minimum number of means for a fit of two constants.
 const FEWEST_MEANS: usize = 4;
 
-/// Where the fit begins, over the outermost node's radius: further in, p² bends more than a
-/// parabola.
+/// Start of the fit, relative to the radius of the outermost node: further inside, p² deviates from
+/// a parabola.
 const FIT_FROM: f64 = 0.35;
 
 /// Pressure at a point of a contact or of a bonded interface.
@@ -54,7 +54,7 @@ pub struct PressurePoint {
     pub pressure_pa: f64,
 }
 
-/// A contact radius and how far the mesh leaves it open.
+/// A contact radius with its numerical uncertainty.
 ///
 /// ```
 /// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
@@ -78,13 +78,13 @@ pub struct ContactRadius {
     pub uncertainty_m: f64,
 }
 
-/// Smooth pressures of a contact and its radius, from the pressures at all nodes in contact, those
-/// from the axis outwards, and the force they carry.
+/// Smooth pressures of a contact and its radius, from the pressures at all nodes in contact, in
+/// order from the axis outwards, and the axial forces there.
 pub(crate) fn contact_profile(
     points: Vec<PressurePoint>,
     force: f64,
 ) -> (Vec<PressurePoint>, Option<ContactRadius>) {
-    // A contact of few nodes, or one that does not reach the axis, keeps its pressures.
+    // A contact with few nodes, or one that does not reach the axis, keeps its pressures.
     if points.len() < 5 || points[0].r_m != 0.0 {
         return (points, None);
     }
@@ -95,14 +95,15 @@ pub(crate) fn contact_profile(
         radius_m: fine.square.sqrt(),
         uncertainty_m: match fit(LEFT_OUT_LIMIT + 1) {
             Some(coarse) => (fine.square.sqrt() - coarse.square.sqrt()).abs(),
-            // Nothing to compare with: half the distance between the outermost nodes.
+            // Without a second fit, the uncertainty is half the distance between the outermost
+            // nodes.
             None => 0.5 * (points[points.len() - 1].r_m - points[points.len() - 2].r_m),
         },
     });
     (smooth(&points, &means, fine.as_ref()), radius)
 }
 
-/// Mean pressure over the hat function of an edge's end, with mean and variance of r² there.
+/// Mean pressure over the hat function of an edge's end, with mean and variance of r².
 struct Mean {
     square: f64,
     variance: f64,
@@ -110,15 +111,15 @@ struct Mean {
 }
 
 impl Mean {
-    /// p² at the mean of r². Where p² falls linearly to zero at a², the mean of p is less than p
-    /// there by var(r²)/8(a² − r²)² of it.
+    /// p² at the mean of r². If p² falls linearly to zero at a², the mean of p is smaller than p
+    /// there by the fraction var(r²)/8(a² − r²)².
     fn pressure_squared(&self, edge: Option<f64>) -> f64 {
         let to_edge = edge.map_or(f64::INFINITY, |square| square - self.square);
         self.pressure * self.pressure * (1.0 + 0.25 * self.variance / (to_edge * to_edge))
     }
 }
 
-/// Integrals over 2πr dr of a weight N that is linear between nodes: of N, N r², N r⁴ and N p.
+/// Integrals over 2πr dr with a weight N that is linear between nodes: of N, N r², N r⁴ and N p.
 #[derive(Default)]
 struct Moments {
     area: f64,
@@ -128,8 +129,7 @@ struct Moments {
 }
 
 impl Moments {
-    /// Adds the stretch between two nodes. N falls or grows linearly between its values there, and
-    /// so does the pressure.
+    /// Adds the interval between two nodes, over which N and the pressure are linear.
     fn add(&mut self, nodes: [&PressurePoint; 2], weights: [f64; 2]) {
         let between = |values: [f64; 2], t: f64| values[0] + t * (values[1] - values[0]);
         let radii = nodes.map(|node| node.r_m);
@@ -173,14 +173,15 @@ struct Fit {
     /// a².
     square: f64,
     constants: [f64; 2],
-    /// The outermost mean of the fit, which stands for the pressure from there on.
+    /// The outermost mean of the fit, which represents the pressure from there on.
     from: usize,
 }
 
 impl Fit {
-    /// The constants fit the means inside the contact's outermost elements. The radius a is where
-    /// the fit carries the same force outside as the elements do, which equilibrium makes accurate
-    /// although their pressures are not. `None` with too few nodes in contact.
+    /// The constants are fitted to the means inside the outermost elements of the contact. The
+    /// radius a is that for which the fit carries the same force outside as the elements. By
+    /// equilibrium this force is accurate, although the pressures of the elements are not. `None`
+    /// if too few nodes are in contact.
     fn new(points: &[PressurePoint], force: f64, means: &[Mean], left_out: usize) -> Option<Self> {
         let last_end = (points.len() - 1) / 2;
         let from = last_end.checked_sub(left_out)?.min(means.len() - 1);
@@ -191,8 +192,8 @@ impl Fit {
         if fitted.len() < FEWEST_MEANS {
             return None;
         }
-        // What the function carries that grows from zero at the end before to one at this end and
-        // beyond.
+        // Force under the function that grows from zero at the previous end to one at this end and
+        // outside.
         let (inner, start) = (points[2 * from - 2].r_m, points[2 * from].r_m);
         let mut within = Moments::default();
         for k in 0..2 * from {
@@ -231,7 +232,7 @@ impl Fit {
         t * (self.constants[0] + self.constants[1] * t)
     }
 
-    /// ∫ N p 2πr dr with N growing from zero at one radius to one at the other.
+    /// ∫ N p 2πr dr, with N growing from zero at one radius to one at the other.
     fn ramp_force(&self, inner: f64, outer: f64) -> f64 {
         let mut force = 0.0;
         for (x, weight) in GAUSS3 {
@@ -243,10 +244,10 @@ impl Fit {
         force
     }
 
-    /// π ∫ p ds from `start` squared to a².
+    /// π ∫ p ds from the square of `start` to a².
     fn outer_force(&self, start: f64) -> f64 {
-        // With t = t₀ x², √(c₀ t + c₁ t²) dt = 2 t₀^{3/2} x² √(c₀ + c₁ t₀ x²) dx, smooth in x:
-        // Simpson's rule.
+        // With t = t₀ x², √(c₀ t + c₁ t²) dt = 2 t₀^{3/2} x² √(c₀ + c₁ t₀ x²) dx is smooth in x, so
+        // Simpson's rule is used.
         let t0 = 1.0 - start * start / self.square;
         let [c0, c1] = self.constants;
         let value = |x: f64| x * x * (c0 + c1 * t0 * x * x).max(0.0).sqrt();
@@ -278,7 +279,7 @@ fn constants(fitted: &[&Mean], square: f64) -> Option<[f64; 2]> {
     Some((normal.try_inverse()? * right).into())
 }
 
-/// Pressures at the edge ends: p² linear in r² between the means, and the fit's where these end.
+/// Pressures at the edge ends: p² is linear in r² between the means, and from the fit outside.
 fn smooth(points: &[PressurePoint], means: &[Mean], fit: Option<&Fit>) -> Vec<PressurePoint> {
     let edge = fit.map(|fit| fit.square);
     let between_means = |end: usize, square: f64| {
@@ -307,7 +308,7 @@ fn smooth(points: &[PressurePoint], means: &[Mean], fit: Option<&Fit>) -> Vec<Pr
 }
 
 impl ElementModel {
-    /// Force per deformed area at the contact's nodes from the axis outwards, and their axial
+    /// Force per deformed area at the contact's nodes, from the axis outwards, and their axial
     /// forces.
     pub(crate) fn contact_pressure(&self, fields: &ModelFields) -> (Vec<PressurePoint>, Vec<f64>) {
         let placement = self.placement(fields);
@@ -338,7 +339,7 @@ impl ElementModel {
         points.into_iter().unzip()
     }
 
-    /// Axial forces that press the bodies together at the interface's nodes.
+    /// Axial forces at the interface's nodes that press the bodies together.
     pub(crate) fn interface_forces(
         &self,
         interface: &BondedInterface,
@@ -349,7 +350,7 @@ impl ElementModel {
             let nodes = &self.elements[index];
             let shear = self.materials[self.regions[index]].shear_modulus();
             let u = fields.element(nodes);
-            // A state in equilibrium has no inverted element.
+            // In equilibrium no element is inverted.
             let Some(element) = self.geometry[index].forces(self.kinematics, shear, &u) else {
                 continue;
             };
@@ -365,14 +366,14 @@ impl ElementModel {
 
     /// Axial force per projected deformed area on the interface, from the axis outwards.
     ///
-    /// The nodal forces that the elements of one side put in balance are the pressure's moments
-    /// with the shape functions. Forces of single nodes alternate. Their sums with the hat function
+    /// The nodal forces balanced by the elements of one side are the moments of the pressure with
+    /// the shape functions. Forces of single nodes alternate, but their sums with the hat function
     /// φ of each corner do not:
     ///
     /// $$ P_a = \frac{f_a}{\int \phi_a 2\pi r dr} = p(\bar r_a) + \tfrac12 \sigma_a^2 p'' + \dots
     /// $$
     ///
-    /// with the mean and the variance of r under φ. The second term is taken off by the second
+    /// with the mean and the variance of r under φ. The second term is subtracted, using the second
     /// difference of neighbouring means.
     pub(crate) fn interface_pressure(
         &self,
@@ -446,7 +447,7 @@ struct InterfaceMoments {
     radius: f64,
     square: f64,
     height: f64,
-    /// Axial force of the edges' middles.
+    /// Axial force at the midpoints of the edges.
     force: f64,
 }
 
@@ -471,13 +472,13 @@ impl InterfaceMoments {
     }
 }
 
-/// Second derivative of the mean pressure by the radius, from three neighbours. At the axis from
-/// the mirrored one.
+/// Second derivative of the mean pressure by the radius, from three neighbours. At the axis the
+/// mirrored neighbour is used.
 fn second_difference(means: &[HatMean], at: usize) -> Option<f64> {
     let here = means.get(at)?;
     let after = means.get(at + 1)?;
     let before = match at {
-        // p is even in r: its second derivative there is that of the two nearest means.
+        // p is even in r, so its second derivative there follows from the two nearest means.
         0 => {
             let squares =
                 after.radius.powi(2) + after.variance - here.radius.powi(2) - here.variance;

@@ -1,8 +1,5 @@
-//! Ready models of what a sensor meets.
-//!
-//! Loads, and what a solution reports.
-//!
-//! A cylinder squeezed between two rigid plates.
+//! Ready models of typical sensor contacts, their loads, and the report of a solution. Includes a
+//! cylinder compressed between two rigid plates.
 
 use crate::material::{Kinematics, Material};
 use crate::mesh::{BlockMesh, Boundary, InclusionSize};
@@ -11,11 +8,11 @@ use crate::press::{Guide, Interface, ObjectPress, ObjectShape};
 use crate::state::{State, Stress};
 use tactile_elasticity::{ElasticityError, Quantity};
 
-/// Mesh fineness where nothing else is asked: elements along an eighth of an inclusion's
-/// circumference.
+/// Default mesh fineness: elements along an eighth of an inclusion's circumference.
 const BLOCK_FINENESS: usize = 5;
 
-/// A spheroid of another material within a block, on its axis: a ball where it is as tall as wide.
+/// A spheroid of another material inside a block, on its axis. It is a ball if it is as tall as
+/// wide.
 ///
 /// ```
 /// use tactile_fem::{Block, Lump, Material};
@@ -42,13 +39,13 @@ const BLOCK_FINENESS: usize = 5;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Lump {
-    /// Its diameter across the axis, in metres.
+    /// Diameter across the axis, in metres.
     pub diameter_m: f64,
-    /// Its height along the axis, in metres.
+    /// Height along the axis, in metres.
     pub height_m: f64,
-    /// From the block's surface to its top, in metres.
+    /// Distance from the block's surface to its top, in metres.
     pub depth_m: f64,
-    /// What it is made of.
+    /// Material of the lump.
     pub material: Material,
 }
 
@@ -79,17 +76,17 @@ pub struct Lump {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Block {
-    /// Its height, in metres.
+    /// Height in metres.
     pub height_m: f64,
-    /// Its radius, in metres, greater than the guide's.
+    /// Radius in metres, greater than that of the guide.
     pub radius_m: f64,
-    /// What it is made of.
+    /// Material of the block.
     pub material: Material,
-    /// An inclusion, if it has one.
+    /// The inclusion. `None` for a homogeneous block.
     pub lump: Option<Lump>,
 }
 
-/// A model ready to be solved, with the pressure between guide and object as its result.
+/// A model ready to be solved. Its result is the pressure between guide and object.
 ///
 /// ```
 /// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
@@ -110,12 +107,14 @@ pub struct FemScene {
 }
 
 impl FemScene {
-    /// A block with or without an inclusion under a guide's face. The block's far side is held, the
-    /// guide's glass moves by the approach. [`Block`] and [`Interface`] have examples.
+    /// A block with or without an inclusion under the face of a guide. The far side of the block is
+    /// held, and the glass of the guide moves by the approach. [`Block`] and [`Interface`] have
+    /// examples.
     ///
     /// # Errors
-    /// Lengths that are not positive. A block no wider than the guide. An inclusion that is not
-    /// inside the block, not narrower than the guide or below a fiftieth of its radius.
+    /// An error for lengths that are not positive, for a block no wider than the guide, and for an
+    /// inclusion that is not inside the block, not narrower than the guide, or below a fiftieth of
+    /// its radius.
     pub fn block_under_guide(
         block: &Block,
         guide: &Guide,
@@ -124,7 +123,7 @@ impl FemScene {
         Self::block_with_mesh(block, guide, interface, BLOCK_FINENESS, Kinematics::Finite)
     }
 
-    /// [`Self::block_under_guide`] on a mesh with `fineness` elements along an eighth of the
+    /// Like [`Self::block_under_guide`], on a mesh with `fineness` elements along an eighth of the
     /// inclusion's circumference, at finite or small strain.
     pub fn block_with_mesh(
         block: &Block,
@@ -142,8 +141,9 @@ impl FemScene {
             Quantity::Radius.positive(lump.diameter_m)?;
             Quantity::Thickness.positive(lump.height_m)?;
             Quantity::Thickness.positive(lump.depth_m)?;
-            // The number of elements grows as the face over the lump: below these parts of its
-            // radius there would be thousands of them, for a lump that does not show.
+            // The number of elements grows with the ratio of the face to the lump. Below these
+            // fractions of the face radius there would be thousands of elements, for a lump that
+            // has no visible effect.
             let (least_diameter, least_depth) = (0.02, 0.001);
             for (quantity, found, part) in [
                 (Quantity::Radius, lump.diameter_m, least_diameter),
@@ -224,8 +224,8 @@ impl FemScene {
     /// Cauchy stress at the material point with reference coordinates (r, z) in metres. `None`
     /// outside the bodies, or for a state of another scene.
     ///
-    /// From the derivatives of quadratic displacements: second order in the elements' size,
-    /// discontinuous between elements. O(elements).
+    /// It is computed from the derivatives of quadratic displacements: second order in the element
+    /// size, and discontinuous between elements. O(elements).
     ///
     /// ```
     /// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
@@ -236,7 +236,7 @@ impl FemScene {
     /// .and_then(|press| press.scene())
     /// .unwrap();
     /// let state = &scene.solve(&[AppliedLoad::Approach(0.3e-3)]).states[0];
-    /// // Pressed along the axis.
+    /// // Compression along the axis.
     /// assert!(scene.stress(state, [0.1e-3, 1e-3]).unwrap().zz_pa < 0.0);
     /// ```
     pub fn stress(&self, state: &State, point: [f64; 2]) -> Option<Stress> {
@@ -245,10 +245,11 @@ impl FemScene {
 }
 
 impl ObjectPress {
-    /// The scene of it: the object's far side stays, the glass or the flat moves by the approach.
+    /// The scene of this press: the far side of the object is fixed, and the glass or flat moves by
+    /// the approach.
     ///
     /// # Errors
-    /// [`ElasticityError::DegenerateElement`] where the proportions leave an element without area.
+    /// [`ElasticityError::DegenerateElement`] if the proportions leave an element without area.
     pub fn scene(&self) -> Result<FemScene, ElasticityError> {
         Ok(FemScene {
             model: self.model()?,
@@ -256,7 +257,7 @@ impl ObjectPress {
     }
 }
 
-/// One load: how far the driven boundaries have moved, or with what force.
+/// One load: the displacement of the driven boundaries, or their force.
 ///
 /// ```
 /// use tactile_fem::AppliedLoad;
@@ -269,11 +270,11 @@ impl ObjectPress {
 pub enum AppliedLoad {
     /// The approach δ, in metres.
     Approach(f64),
-    /// The force on the driven boundaries, in newtons. Positive presses.
+    /// The force on the driven boundaries, in newtons, positive in compression.
     Force(f64),
 }
 
-/// How a solution ended.
+/// Outcome of a solution.
 ///
 /// ```
 /// use tactile_fem::Outcome;
@@ -284,20 +285,20 @@ pub enum AppliedLoad {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum Outcome {
-    /// Every load has its state.
+    /// Every load was reached.
     Solved,
-    /// This load was not reached. The states of those before it are given.
+    /// This load was not reached. The states of earlier loads are available.
     Stopped {
         /// Index of the load.
         load: usize,
-        /// The last approach in equilibrium, in metres.
+        /// Approach of the last equilibrium, in metres.
         approach_m: f64,
-        /// The force there, in newtons.
+        /// Force of the last equilibrium, in newtons.
         force_n: f64,
     },
 }
 
-/// What the solver did.
+/// Report of the solver.
 ///
 /// ```
 /// use tactile_fem::{AppliedLoad, Material, ObjectShape, Outcome, ObjectPress};
@@ -315,11 +316,12 @@ pub enum Outcome {
 pub struct SolverReport {
     /// Whether all loads were reached.
     pub outcome: Outcome,
-    /// Load steps that converged.
+    /// Number of load steps that converged.
     pub steps: usize,
-    /// Load steps given up and taken again in halves.
+    /// Number of load steps that were rejected and repeated in halves.
     pub rejected_steps: usize,
-    /// Newton iterations, those with an earlier tangent and of rejected steps too.
+    /// Number of Newton iterations, including those with an earlier tangent and those of rejected
+    /// steps.
     pub iterations: usize,
 }
 
@@ -344,22 +346,22 @@ pub struct SolverReport {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
-    /// One state a load.
+    /// One state per load.
     pub states: Vec<State>,
-    /// What the solver did.
+    /// Report of the solver.
     pub report: SolverReport,
 }
 
 impl FemScene {
-    /// A cylinder between two rigid plates to which both faces stick, or on which they slide
-    /// without friction. One half of it is solved: the other is its mirror image, and the approach
-    /// is that of one plate to the middle, half of the whole squeeze.
+    /// A cylinder between two rigid plates, to which both faces stick or on which they slide
+    /// without friction. One half is solved, because the other is its mirror image. The approach is
+    /// that of one plate to the middle, half of the total compression.
     ///
-    /// The [pressure](crate::State::pressure) is that on the face. Sliding, it is even, and the
-    /// state is homogeneous. Sticking, the sides bulge, the pressure depends on the radius and is
-    /// singular at the rim, where it is the mean over the last element. That the bulging side comes
-    /// to lie on the plate is not followed: at a squeeze of 10 % it does so over some hundredths of
-    /// the radius.
+    /// The [pressure](crate::State::pressure) is that on the face. With sliding it is uniform, and
+    /// the state is homogeneous. With sticking, the sides bulge, and the pressure depends on the
+    /// radius. It is singular at the rim, where the result is the mean over the last element. The
+    /// bulging side can come into contact with the plate, which is neglected: at a compression of
+    /// 10 % this affects several hundredths of the radius.
     ///
     /// ```
     /// use tactile_fem::{Interface, AppliedLoad, Material, FemScene};
@@ -376,7 +378,7 @@ impl FemScene {
     /// ```
     ///
     /// # Errors
-    /// Lengths that are not positive.
+    /// An error for lengths that are not positive.
     pub fn cylinder_between_plates(
         radius_m: f64,
         height_m: f64,

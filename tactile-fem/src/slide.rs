@@ -1,63 +1,68 @@
 //! Surfaces that slide far on each other without friction, at one approach.
 //!
-//! [`ElementModel::slide`](crate::model::ElementModel::slide) lets nodes of one place share their
-//! axial displacement. As the bodies spread by different amounts, such nodes part sideways by some
-//! tenths of a millimetre, which moves the pressure by up to 1.1 % at a tenth of the block's
-//! height. The upper body's mesh is therefore moved along its surface until nodes that share a
-//! displacement meet in the deformed state.
+//! With [`ElementModel::slide`](crate::model::ElementModel::slide), coincident nodes share their
+//! axial displacement. Because the bodies spread by different amounts, such nodes separate sideways
+//! by several tenths of a millimetre, which changes the pressure by up to 1.1 % at a tenth of the
+//! block's height. The mesh of the upper body is therefore moved along its surface until nodes that
+//! share a displacement coincide in the deformed state.
 //!
-//! The pressure acts along the axis: its radial share p dz/dr on the slightly bent face is left
-//! out. CalculiX with faces tied in the same way agrees (`evidence/inclusion_scenes.py`, the test
-//! `inclusion::against_calculix`). With contact pairs, whose pressure is normal to the bent face,
-//! CalculiX's forces and pressures are lower by 0.3 % at a thirtieth of the block's height and by
-//! about 2 % at a tenth, which the search does not allow for.
+//! The pressure acts along the axis: its radial component p dz/dr on the slightly bent face is
+//! neglected. CalculiX with faces tied in the same way agrees (`evidence/inclusion_scenes.py`, the
+//! test `inclusion::against_calculix`). With contact pairs, whose pressure is normal to the bent
+//! face, CalculiX's forces and pressures are lower by 0.3 % at a thirtieth of the block's height
+//! and by about 2 % at a tenth, which the search does not take into account.
 
 use crate::model::ElementModel;
 use crate::scene::{AppliedLoad, FemScene};
 use crate::state::State;
 use crate::system::Layout;
 
-/// Distance of the rim's nodes over the face's radius at which they meet ([`MET`] elsewhere).
+/// Distance at which nodes of the rim count as coincident, relative to the face radius ([`MET`]
+/// elsewhere).
 const RIM_MET: f64 = 5e-5;
 
-/// Part of the face's radius beyond which nodes count as the rim's, and their distance there: at
-/// a tenth of the block's height rounds leave a half of it instead of a tenth, and the pressure
-/// within three quarters of the face changes by a hundredth of it.
+/// Fraction of the face radius above which nodes belong to the rim, with their own tolerance. At a
+/// tenth of the block's height a round leaves half of their distance instead of a tenth, and the
+/// pressure within three quarters of the face changes by a hundredth of it.
 const RIM_LIMIT: f64 = 0.9;
 
-/// Distance of nodes over the face's radius at which they meet: pressures change by as large a
-/// part.
+/// Distance at which nodes count as coincident, relative to the face radius. Pressures change by
+/// the same fraction.
 const MET: f64 = 2e-6;
 
-/// Part of the distance that a round may leave. Beyond a tenth of the block's height the rim's
-/// nodes of a coarse mesh pass each other to and fro: moves are halved then. Left there, the
-/// pressure would depend on where the rounds began, by 0.3 % at three quarters of the radius.
+/// Fraction of the distance that a round may leave. Above a tenth of the block's height, the rim
+/// nodes of a coarse mesh oscillate; moves are then halved. Otherwise the pressure would depend on
+/// the start of the rounds, by 0.3 % at three quarters of the radius.
 const STALLED: f64 = 0.8;
 
-/// Part of a distance below which a halved move is given up.
+/// Minimum fraction of a distance for a halved move.
 const LEAST_MOVE: f64 = 0.1;
 
-/// Rounds of meshing and solving; each leaves about a tenth of the distance before.
+/// Maximum number of rounds of meshing and solving. Each leaves about a tenth of the previous
+/// distance.
 const MAX_ROUNDS: usize = 12;
 
-/// Least part of a distance that is moved.
+/// Minimum fraction of a distance that is moved.
 const LEAST_PART: f64 = 0.2;
 
-/// Largest change of a shift over the distance of two nodes. Inside the face it is below 0.1.
+/// Largest change of a shift relative to the distance of two nodes. Inside the face it is below
+/// 0.1.
 const LARGEST_GROWTH: f64 = 0.9;
 
-/// A node of the upper surface and the one of the lower that shares its axial displacement.
+/// A node of the upper surface, with the node of the lower surface that shares its axial
+/// displacement.
 struct Pair {
     upper: usize,
     lower: usize,
 }
 
 impl FemScene {
-    /// Scene and state at an approach with surfaces that slide. Those of a bonded interface
-    /// unchanged.
+    /// Scene and state at an approach with sliding surfaces. Scenes with a bonded interface are
+    /// returned unchanged.
     ///
-    /// `depth_m` is how far below the surface the mesh may move. `near` a solution nearby, on a
-    /// mesh with the same elements, `layout` one of such a mesh. `None` where there is no solution.
+    /// `depth_m` is the depth below the surface to which the mesh may move. `near` is a nearby
+    /// solution on a mesh with the same elements, and `layout` belongs to such a mesh. `None` if
+    /// there is no solution.
     pub(crate) fn slid(
         &self,
         layout: &mut Layout,
@@ -69,7 +74,7 @@ impl FemScene {
         let near = near.filter(|(scene, _)| scene.model.elements == self.model.elements);
         let mut scene = match near {
             Some((near, state)) => {
-                // How far surfaces slide is nearly proportional to the approach.
+                // The sliding distance is nearly proportional to the approach.
                 let growth = approach_m / state.approach_m();
                 self.with_pairs_of(&near.model, growth, depth_m)
                     .or_else(|| self.with_pairs_of(&near.model, 1.0, depth_m))?
@@ -124,7 +129,7 @@ impl FemScene {
         Some((scene, state))
     }
 
-    /// How far the nodes of each pair are apart along r, at the nodes' displacements (r, z).
+    /// Distances along r between the nodes of each pair, at the nodal displacements (r, z).
     pub(crate) fn distances(&self, displacement: &[f64]) -> Vec<f64> {
         let radius = |node: usize| self.model.nodes[node][0] + displacement[2 * node];
         let pairs = self.model.pairs().into_iter();
@@ -142,8 +147,7 @@ impl FemScene {
         self.shifted(&shifts, depth_m)
     }
 
-    /// This scene with the upper surface's nodes where another scene has them, its shifts times
-    /// `growth`.
+    /// This scene with the nodes of the upper surface shifted as in another scene, times `growth`.
     fn with_pairs_of(&self, near: &ElementModel, growth: f64, depth_m: f64) -> Option<Self> {
         let mut shifts = Vec::new();
         for pair in self.model.pairs() {
@@ -154,8 +158,8 @@ impl FemScene {
         self.shifted(&shifts, depth_m)
     }
 
-    /// This scene with nodes of the upper body moved along r: at the surface by the second of
-    /// `shifts` at the first, none at `depth_m` and at the outer side, linearly in between.
+    /// This scene with nodes of the upper body moved along r: at the surface by the second value of
+    /// `shifts` at the first, by zero at `depth_m` and at the outer side, and linearly in between.
     fn shifted(&self, shifts: &[[f64; 2]], depth_m: f64) -> Option<Self> {
         let mut scene = self.clone();
         let model = &mut scene.model;
@@ -189,25 +193,25 @@ impl FemScene {
     }
 }
 
-/// Part of its distance by which each pair's node is moved: a secant's step, pair by pair.
+/// Fraction of its distance by which the node of each pair is moved: a secant step, pair by pair.
 ///
-/// A move by δ changes a distance by −δ where the face is smooth. At the rim, whose pressure the
-/// move changes, the change is larger, at a tenth of the block's height twice as large: full steps
-/// would never end.
+/// On a smooth face, a move by δ changes a distance by −δ. At the rim, where the move also changes
+/// the pressure, the change is larger, by a factor of two at a tenth of the block's height: full
+/// steps would never converge.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Relaxation {
-    /// Distance before the last move, and the part of it that was moved.
+    /// Distance before the last move, and the fraction of it that was moved.
     last: Vec<(f64, f64)>,
 }
 
 impl Relaxation {
-    /// The part of a distance by which a node is moved, from the last two distances.
+    /// The fraction of a distance by which a node is moved, from the last two distances.
     pub(crate) fn next(&mut self, distances: impl Iterator<Item = f64>) -> Vec<f64> {
         let mut last = core::mem::take(&mut self.last).into_iter();
         for now in distances {
             let part = last.next().map_or(1.0, |(before, part)| {
                 let secant = part * before / (before - now);
-                // Distances that are rounding alone say nothing.
+                // Distances at rounding level give no secant.
                 if secant.is_finite() {
                     secant.clamp(LEAST_PART, 1.0)
                 } else {
@@ -220,8 +224,8 @@ impl Relaxation {
     }
 }
 
-/// Keeps neighbouring shifts from differing by more than a part of the nodes' distance: at the rim,
-/// where the displacement is singular, elements would be turned inside out.
+/// Limits the difference of neighbouring shifts to a fraction of the distance of the nodes: at the
+/// rim, where the displacement is singular, elements would be inverted.
 fn limit_growth(shifts: &mut [[f64; 2]]) {
     for k in 1..shifts.len() {
         let [[before, last], [here, shift]] = [shifts[k - 1], shifts[k]];

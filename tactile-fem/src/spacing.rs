@@ -1,6 +1,6 @@
-//! Lines of meshes: even, graded, and finest around a contact.
+//! Lines of meshes: uniform, graded, and finest around a contact.
 
-/// Lines with the middle of each interval between them.
+/// Lines with the midpoint of each interval between them.
 pub(crate) fn with_middles(lines: &[f64]) -> Vec<f64> {
     let mut all = vec![lines[0]];
     for pair in lines.windows(2) {
@@ -10,7 +10,7 @@ pub(crate) fn with_middles(lines: &[f64]) -> Vec<f64> {
     all
 }
 
-/// Distance along a polyline over its length.
+/// Distance along a polyline relative to its length.
 pub(crate) fn arc_fractions(points: &[[f64; 2]]) -> Vec<f64> {
     let mut lengths = vec![0.0];
     for pair in points.windows(2) {
@@ -21,7 +21,7 @@ pub(crate) fn arc_fractions(points: &[[f64; 2]]) -> Vec<f64> {
     lengths.into_iter().map(|length| length / total).collect()
 }
 
-/// Lines from `start` to `end`: steps begin at `first` and grow by `growth`, scaled to fit.
+/// Lines from `start` to `end`: steps start at `first` and grow by `growth`, scaled to fit.
 pub(crate) fn graded(start: f64, end: f64, first: f64, growth: f64) -> Vec<f64> {
     let length = (end - start).abs();
     // Steps that sum to the length: n from the geometric series, at least one.
@@ -46,7 +46,7 @@ pub(crate) fn graded(start: f64, end: f64, first: f64, growth: f64) -> Vec<f64> 
     lines
 }
 
-/// As [`graded`], with steps of about `largest` where they would be longer.
+/// Like [`graded`], with steps limited to about `largest`.
 pub(crate) fn graded_up_to(
     start: f64,
     end: f64,
@@ -71,8 +71,8 @@ pub(crate) fn graded_up_to(
     lines
 }
 
-/// Lines that resolve a contact around the axis at every size from `inner` outwards: `count`
-/// uniform steps up to `inner`, then growing by `growth` up to steps of `largest`, to `end`.
+/// Lines that resolve a contact around the axis of any size from `inner` outwards: `count` uniform
+/// steps up to `inner`, then steps growing by `growth` up to `largest`, until `end`.
 pub(crate) fn contact_lines(
     inner: f64,
     count: usize,
@@ -87,13 +87,14 @@ pub(crate) fn contact_lines(
     lines
 }
 
-/// Lines after the last up to `end`: each step is `growth` times the one before, at most `largest`.
+/// Appends lines after the last up to `end`: each step is `growth` times the previous one, at most
+/// `largest`.
 pub(crate) fn grow(lines: &mut Vec<f64>, mut step: f64, growth: f64, largest: f64, end: f64) {
     loop {
         step = (step * growth).min(largest);
         let last = lines[lines.len() - 1];
         let left = end - last;
-        // The last two steps share what is left rather than leave a sliver.
+        // The last two steps share the remainder, which avoids a sliver.
         if left <= 1.5 * step {
             if left > 0.0 {
                 lines.push(end);

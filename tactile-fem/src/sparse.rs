@@ -1,7 +1,7 @@
 //! Sparse symmetric systems: pattern, LDLᵀ factorisation, solution.
 //!
-//! The analysis (fill-reducing order, elimination tree, supernodes) is made once a pattern and
-//! serves every matrix that has it.
+//! The analysis (fill-reducing order, elimination tree, supernodes) is made once per pattern and
+//! serves every matrix with this pattern.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
@@ -14,11 +14,11 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
 use std::sync::Arc;
 
-/// The system cannot be solved: a pivot vanished, or there is no memory for the factors.
+/// The system cannot be solved: a pivot vanished, or there is not enough memory for the factors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Singular;
 
-/// Where a symmetric matrix has entries, and how it is factorised.
+/// The sparsity pattern of a symmetric matrix, with its symbolic factorisation.
 #[derive(Debug)]
 pub(crate) struct Pattern {
     /// Lower half: rows of each column, ascending from the diagonal.
@@ -27,7 +27,7 @@ pub(crate) struct Pattern {
 }
 
 impl Pattern {
-    /// The pattern of `size` equations that couples each group's with each other.
+    /// The pattern of `size` equations in which the equations of each group are coupled.
     pub(crate) fn new<'a>(
         size: usize,
         groups: impl Iterator<Item = &'a [usize]>,
@@ -52,7 +52,8 @@ impl Pattern {
             Side::Lower,
             SymmetricOrdering::Amd,
             CholeskySymbolicParams {
-                // Meshes of a few hundred elements already take half the time by blocks.
+                // For meshes of a few hundred elements, block factorisation already takes half the
+                // time.
                 supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
                 ..Default::default()
             },
@@ -63,7 +64,7 @@ impl Pattern {
         })
     }
 
-    /// Place of the entry (i, j), which is that of (j, i) too.
+    /// Index of the entry (i, j), which is also that of (j, i).
     pub(crate) fn place(&self, i: usize, j: usize) -> Option<usize> {
         let (row, column) = (i.max(j), i.min(j));
         let range = self.entries.col_range(column);
@@ -94,7 +95,7 @@ impl Symmetric {
         }
     }
 
-    /// Adds to the entry (i, j) and so to (j, i), which the pattern must have.
+    /// Adds to the entry (i, j), and so to (j, i). The pattern must contain it.
     pub(crate) fn add(&mut self, i: usize, j: usize, value: f64) {
         let place = self.pattern.place(i, j);
         debug_assert!(place.is_some(), "no entry ({i}, {j})");
@@ -103,15 +104,15 @@ impl Symmetric {
         }
     }
 
-    /// Adds to the entry at a place of the pattern.
+    /// Adds to the entry with this index in the pattern.
     pub(crate) fn add_at(&mut self, place: usize, value: f64) {
         self.values[place] += value;
     }
 
     /// LDLᵀ factors.
     ///
-    /// Without pivoting: a stable equilibrium's tangent is positive definite. Where it is not, the
-    /// step that Newton's method then takes is judged by its residual.
+    /// There is no pivoting: the tangent of a stable equilibrium is positive definite. Otherwise
+    /// the resulting Newton step is judged by its residual.
     pub(crate) fn factorise(&self) -> Result<Factors, Singular> {
         let analysis = &self.pattern.analysis;
         let mut values = vec![0.0; analysis.len_val()];
@@ -142,7 +143,7 @@ pub(crate) struct Factors {
 }
 
 impl Factors {
-    /// Solves in place for right-hand sides that follow each other in `x`.
+    /// Solves in place for consecutive right-hand sides in `x`.
     pub(crate) fn solve(&self, x: &mut [f64]) -> Result<(), Singular> {
         let analysis = &self.pattern.analysis;
         let size = analysis.nrows();
@@ -155,7 +156,7 @@ impl Factors {
             Par::Seq,
             MemStack::new(&mut memory),
         );
-        // A pivot that is rounding alone passes the factorisation and shows here.
+        // A pivot at rounding level passes the factorisation and is detected here.
         if x.iter().all(|value| value.is_finite()) {
             Ok(())
         } else {

@@ -1,8 +1,4 @@
-//! The solution at one load.
-//!
-//! Pressures and contact radii as results.
-//!
-//! Stresses at any point of a state.
+//! The solution at one load, with its pressures, contact radius and stresses.
 
 use crate::element::{ALL, map, position, pressure_functions, shape};
 use crate::material::{Gradient, Kinematics, PointDeformation};
@@ -47,25 +43,26 @@ impl State {
         }
     }
 
-    /// Force on the driven boundaries, in newtons. Positive presses.
+    /// Force on the driven boundaries, in newtons, positive in compression.
     pub fn force_n(&self) -> f64 {
         self.force
     }
 
-    /// How far the driven boundaries have moved, in metres.
+    /// Displacement of the driven boundaries, in metres.
     pub fn approach_m(&self) -> f64 {
         self.fields.approach
     }
 
-    /// Pressure at the elements' ends in contact, or at the nodes of a bonded interface, from the
-    /// axis outwards. Of [`PressurePoint`]'s example. Within a contact's outermost two elements it
-    /// is that of a smooth edge which carries the elements' force.
+    /// Pressure at the ends of the elements in contact, or at the nodes of a bonded interface, from
+    /// the axis outwards, as in the example of [`PressurePoint`]. In the two outermost elements of
+    /// a contact it is the pressure of a smooth edge that carries the force of the elements.
     pub fn pressure(&self) -> &[PressurePoint] {
         &self.pressure
     }
 
-    /// Pressure at a radius of the deformed interface in metres, by the cubic through the four
-    /// nearest points of [`Self::pressure`]. Constant beyond the last, zero without contact.
+    /// Pressure at a radius of the deformed interface in metres, by a cubic through the nearest
+    /// points of [`Self::pressure`]. It is constant outside the last point, and zero without
+    /// contact.
     ///
     /// ```
     /// use tactile_fem::{AppliedLoad, Material, ObjectShape, ObjectPress};
@@ -82,19 +79,19 @@ impl State {
         pressure_at(&self.pressure, radius_m)
     }
 
-    /// Radius at which the contact pressure falls to zero: near a smooth contact's edge p² is
-    /// nearly linear in r², and the force it carries is known from equilibrium.
+    /// Radius at which the contact pressure falls to zero. Near the edge of a smooth contact p² is
+    /// nearly linear in r², and its force is known from equilibrium.
     ///
-    /// `None` where fewer than some eight nodes are in contact.
+    /// `None` if fewer than about eight nodes are in contact.
     pub fn contact_radius(&self) -> Option<ContactRadius> {
         self.radius
     }
 }
 
-/// Pressure at a radius, by the cubic between the two nearest points with the
-/// [slopes](slope_at) there. Constant beyond the last.
+/// Pressure at a radius, by the cubic between the two nearest points with the [slopes](slope_at)
+/// there. It is constant outside the last point.
 ///
-/// The slope is continuous: a fit that moves an inclusion sees no kinks.
+/// The slope is continuous, so a fit that moves an inclusion sees no kinks.
 pub(crate) fn pressure_at(points: &[PressurePoint], radius: f64) -> f64 {
     let after = points.partition_point(|point| point.r_m < radius);
     let Some(last) = points.last() else {
@@ -103,7 +100,7 @@ pub(crate) fn pressure_at(points: &[PressurePoint], radius: f64) -> f64 {
     if after == points.len() || points.len() < 2 {
         return last.pressure_pa;
     }
-    // Before the first point the first cubic goes on.
+    // Before the first point, the first cubic is extrapolated.
     let right = after.max(1);
     let [from, to] = [right - 1, right].map(|k| &points[k]);
     let (length, rise) = (to.r_m - from.r_m, to.pressure_pa - from.pressure_pa);
@@ -113,7 +110,7 @@ pub(crate) fn pressure_at(points: &[PressurePoint], radius: f64) -> f64 {
     from.pressure_pa + t * (rise + (1.0 - t) * bent)
 }
 
-/// Slope of the pressure at a point, by the polynomial through the five nearest.
+/// Slope of the pressure at a point, by the polynomial through the five nearest points.
 fn slope_at(points: &[PressurePoint], at: usize) -> f64 {
     let first = at.saturating_sub(2).min(points.len().saturating_sub(5));
     let near = &points[first..points.len().min(first + 5)];
@@ -132,12 +129,13 @@ fn slope_at(points: &[PressurePoint], at: usize) -> f64 {
     parts.sum()
 }
 
-/// The Cauchy stress at a point, in pascals, tension positive. The components rθ and zθ are zero.
+/// The Cauchy stress at a point, in pascals, positive in tension. The components rθ and zθ are
+/// zero.
 ///
 /// ```
 /// use tactile_fem::{Interface, AppliedLoad, Material, FemScene};
 ///
-/// // A cylinder free to slide between plates, squeezed by a thousandth: σzz = −E/1000 nearly.
+/// // A cylinder that slides freely between plates, compressed by a thousandth: σzz ≈ −E/1000.
 /// let scene = FemScene::cylinder_between_plates(
 ///     2e-3,
 ///     2e-3,
@@ -163,7 +161,7 @@ pub struct Stress {
 }
 
 impl ElementModel {
-    /// Cauchy stress at the material point with reference coordinates (r, z) in metres. Hooke's
+    /// Cauchy stress at the material point with reference coordinates (r, z) in metres, or Hooke's
     /// stress in linear kinematics. `None` outside the bodies, or for a state of another model.
     pub(crate) fn stress(&self, state: &State, point: [f64; 2]) -> Option<Stress> {
         let fields = &state.fields;
@@ -171,7 +169,8 @@ impl ElementModel {
             return None;
         }
         let (index, [xi, eta]) = self.locate(point)?;
-        // On the axis u_r / r is ∂u_r/∂r: taken from close by, where the quotient is still exact.
+        // On the axis u_r / r is ∂u_r/∂r. It is evaluated nearby, where the quotient is still
+        // accurate.
         let xi = if point[0] == 0.0 {
             xi * (1.0 - 1e-7)
         } else {
@@ -212,9 +211,9 @@ impl ElementModel {
         })
     }
 
-    /// The element that holds a point of the reference configuration, and the point's ξ and η.
+    /// The element that contains a point of the reference configuration, and ξ and η of the point.
     fn locate(&self, point: [f64; 2]) -> Option<(usize, [f64; 2])> {
-        // Rounding alone takes points of a shared edge out of both elements.
+        // Rounding may place points of a shared edge outside both elements.
         let limit = 1.0 + 1e-9;
         self.elements.iter().enumerate().find_map(|(index, nodes)| {
             let nodes = nodes.map(|node| self.nodes[node]);
@@ -235,7 +234,7 @@ impl ElementModel {
     }
 }
 
-/// ξ and η of a point by Newton's method. `None` where it leaves the element's surroundings.
+/// ξ and η of a point by Newton's method. `None` if it leaves the neighbourhood of the element.
 fn inverse_map(nodes: &[[f64; 2]; 9], point: [f64; 2]) -> Option<[f64; 2]> {
     let size = (nodes[2][0] - nodes[0][0]).hypot(nodes[2][1] - nodes[0][1]);
     let mut at = [0.0; 2];

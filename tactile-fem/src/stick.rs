@@ -1,25 +1,25 @@
-//! Anchors: where contact nodes that stick are held, and how far they have slipped.
-//!
-//! Contact without slip: what touches stays where it first touched.
+//! Contact without slip: points that touch stay where they first touched. Contact nodes that stick
+//! have anchors, from which their slip is measured.
 //!
 //! A contact node that carries a pressure after a load step is anchored to the point opposite to
-//! it. Let d be its displacement relative to that point since then and t the surface's direction.
-//! The traction τ = ε t·d per reference area holds it back, with the penalty ε of the normal
-//! pressure. It derives from the potential ½ ε (t·d)². t is that of the last load step: the
-//! potential is quadratic, and its tangent symmetric. A node whose pressure has ended is free again
-//! after the load step: were it so at once, Newton's method would toss it between the two states.
+//! it. Let d be its displacement relative to that point since then, and t the direction of the
+//! surface. The traction τ = ε t·d per reference area holds it back, with the penalty ε of the
+//! normal pressure. It derives from the potential ½ ε (t·d)². The direction t is that of the last
+//! load step, so the potential is quadratic and its tangent symmetric. A node whose pressure has
+//! ended becomes free only after the load step: otherwise Newton's method would switch it between
+//! the two states.
 //!
-//! A node that comes into contact within a load step has done so, on the average, in its middle: it
-//! is anchored to the mean of its relative displacements before and after. Nodes that touch
-//! unloaded are anchored there.
+//! A node that comes into contact within a load step does so on average in its middle. It is
+//! anchored to the mean of its relative displacements before and after the step. Nodes that touch
+//! in the unloaded state are anchored there.
 
 use crate::contact::Placement;
 use crate::material::Kinematics;
 use crate::model::{ElementModel, ModelFields};
 use crate::surface::{Anchor, ContactNode, Opposite};
 
-/// Part of the nodes' spacing within which two unloaded surfaces count as touching: rounding of
-/// coordinates leaves 1e-16 of it.
+/// Fraction of the nodes' spacing within which two unloaded surfaces count as touching. Rounding of
+/// coordinates is 1e-16 of it.
 const TOUCHING: f64 = 1e-9;
 
 impl ElementModel {
@@ -35,8 +35,8 @@ impl ElementModel {
         anchors
     }
 
-    /// Anchors after a load step: those of nodes that still press, turned with the surface, and new
-    /// ones where nodes have come into contact.
+    /// Anchors after a load step: those of nodes that still press, rotated with the surface, and
+    /// new ones for nodes that came into contact.
     pub(crate) fn next_anchors(
         &self,
         before: &ModelFields,

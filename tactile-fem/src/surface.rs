@@ -1,40 +1,42 @@
-//! Surfaces that may touch: their segments and nodes, what lies opposite, where nodes are held.
+//! Surfaces that may touch: their segments and nodes, the opposite bodies, and the anchors of
+//! nodes.
 use crate::element::{GAUSS3, quadratic};
 
-/// Penalty of contact over the softer body's modulus and the edge's length: a pressure of a third
-/// of the modulus then leaves a thousandth of an element's penetration before the multipliers'
-/// update. Ten times less needs more updates, ten times more iterations; the Hertz test shows it.
+/// Contact penalty relative to the softer body's modulus and the edge length. A pressure of a third
+/// of the modulus then leaves a penetration of a thousandth of an element before the update of the
+/// multipliers. A value ten times smaller needs more updates, ten times larger more iterations, as
+/// the Hertz test shows.
 const PENALTY_LIMIT: f64 = 300.0;
 
-/// Stands for the approach among the displacement components of a [`Gap`].
+/// Represents the approach among the displacement components of a [`Gap`].
 pub(crate) const DRIVER: usize = usize::MAX;
 
 /// The shape of a rigid body of revolution, with its lowest point at height zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
-// A flat alone is pressed on objects; the others have the closed forms that tests compare with.
+// Only a flat is pressed on objects. The others have closed-form solutions for the tests.
 #[cfg_attr(not(test), allow(dead_code))]
 pub(crate) enum RigidShape {
-    /// A plane at right angles to the axis.
+    /// A plane perpendicular to the axis.
     Flat,
-    /// The paraboloid r² / 2R, of which Hertz's theory speaks.
+    /// The paraboloid r² / 2R of Hertz's theory.
     Paraboloid {
-        /// Its radius of curvature at the pole, in metres.
+        /// Radius of curvature at the pole, in metres.
         radius_m: f64,
     },
     /// The flat end of a cylinder.
     Punch {
-        /// Its radius, in metres.
+        /// Radius in metres.
         radius_m: f64,
     },
     /// A cone.
     Cone {
-        /// Between its axis and its surface, in radians.
+        /// Angle between its axis and its surface, in radians.
         half_angle_rad: f64,
     },
 }
 
 impl RigidShape {
-    /// Height at radius r, its slope and second derivative. `None` beyond the shape.
+    /// Height, slope and second derivative at radius r. `None` outside the shape.
     pub(crate) fn profile(self, r: f64) -> Option<[f64; 3]> {
         match self {
             Self::Flat => Some([0.0; 3]),
@@ -50,13 +52,13 @@ impl RigidShape {
     }
 }
 
-/// What a surface may touch.
+/// The body that a surface may touch.
 #[derive(Debug, Clone)]
 pub(crate) enum Opposite {
     /// Another body's surface.
     Surface(SurfaceCurve),
-    /// A rigid shape above (+1) or below (−1) the surface, whose pole is at z = 0 in the reference
-    /// configuration. One below moves by the approach.
+    /// A rigid shape above (+1) or below (−1) the surface, with its pole at z = 0 in the reference
+    /// configuration. A shape below moves by the approach.
     Rigid { shape: RigidShape, side: f64 },
 }
 
@@ -78,17 +80,17 @@ pub(crate) struct GapPoint {
     pub nodes: [usize; 3],
     pub shape: [f64; 3],
     pub derivative: [f64; 3],
-    /// Contact nodes whose hat functions reach here, with the functions times the point's reference
-    /// area.
+    /// Contact nodes whose hat functions are non-zero here, with the functions times the reference
+    /// area of the point.
     pub shares: [(usize, f64); 2],
 }
 
-/// A node of a contact surface, which carries a pressure.
+/// A node of a contact surface, with a pressure.
 #[derive(Debug, Clone)]
 pub(crate) struct ContactNode {
     pub pair: usize,
     pub node: usize,
-    /// Reference area of the hat function.
+    /// Integral of the hat function over the reference area.
     pub weight: f64,
     /// Penalty ε: pressure per penetration, Pa/m.
     pub penalty: f64,
@@ -97,7 +99,7 @@ pub(crate) struct ContactNode {
 }
 
 impl ContactSegment {
-    /// Gauss points between the cuts, which are parameters on the edge in ascending order.
+    /// Gauss points between the cuts, which are ascending parameters on the edge.
     pub(crate) fn points(&self, cuts: &[f64], nodes: &[[f64; 2]]) -> Vec<GapPoint> {
         let [start, end] = self.ends;
         let mut bounds = vec![start];
@@ -185,14 +187,16 @@ pub(crate) fn contact_segments(
 pub(crate) struct SurfaceCurve {
     /// Nodes (inner end, middle, outer end).
     edges: Vec<[usize; 3]>,
-    /// +1 where the body is on the left of the way outwards: its outward normal is (z', −r').
+    /// +1 if the body is on the left of the outward direction: its outward normal is then (z',
+    /// −r').
     pub side: f64,
 }
 
 /// Weights of an edge's nodes.
 pub(crate) type Weights = [f64; 3];
 
-/// An edge's nodes, and their weights in position, first and second derivative at one parameter.
+/// The nodes of an edge, and their weights for position, first and second derivative at one
+/// parameter.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CurvePoint {
     pub nodes: [usize; 3],
@@ -200,7 +204,7 @@ pub(crate) struct CurvePoint {
     pub first: Weights,
 }
 
-/// Weights of the second derivative, the same everywhere on an edge.
+/// Weights of the second derivative, constant along an edge.
 pub(crate) const BEND: Weights = [1.0, -2.0, 1.0];
 
 impl CurvePoint {
@@ -211,7 +215,7 @@ impl CurvePoint {
 }
 
 impl SurfaceCurve {
-    /// From edges ordered along a surface whose radius grows along it.
+    /// Creates the curve from edges ordered along a surface with increasing radius.
     pub(crate) fn new(edges: &[[usize; 3]], coordinates: &[[f64; 2]]) -> Self {
         let outwards = |edge: &[usize; 3]| coordinates[edge[2]][0] > coordinates[edge[0]][0];
         Self {
@@ -263,20 +267,20 @@ pub(crate) fn combine(
     sum
 }
 
-/// Where a contact node is held.
+/// Anchor of a contact node.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Anchor {
     /// The node and those of the opposite edge, with their weights in the relative displacement.
     pub weights: Vec<(usize, f64)>,
-    /// Whether what is opposite moves by the approach.
+    /// Whether the opposite body moves by the approach.
     pub driven: bool,
-    /// Relative displacement at which it was anchored.
+    /// Relative displacement at the time of anchoring.
     pub start: [f64; 2],
-    /// Along the surface, a unit vector.
+    /// Unit vector along the surface.
     pub direction: [f64; 2],
 }
 
-/// A distance along the surface and its derivatives by the displacement components `dofs`.
+/// A distance along the surface, with its derivatives by the displacement components `dofs`.
 #[derive(Debug, Clone)]
 pub(crate) struct Slip {
     pub value: f64,
@@ -285,7 +289,7 @@ pub(crate) struct Slip {
 }
 
 impl Anchor {
-    /// Its relative displacement, from the displacements of all nodes and the approach.
+    /// The relative displacement, from the displacements of all nodes and the approach.
     pub(crate) fn displacement(&self, displacement: &[f64], approach: f64) -> [f64; 2] {
         let mut sum = [0.0, if self.driven { -approach } else { 0.0 }];
         for &(node, weight) in &self.weights {
@@ -295,7 +299,7 @@ impl Anchor {
         sum
     }
 
-    /// The same place on a surface that has turned.
+    /// The same anchor on a surface that has rotated.
     pub(crate) fn turned(&self, direction: [f64; 2]) -> Self {
         Self {
             direction,
@@ -303,7 +307,7 @@ impl Anchor {
         }
     }
 
-    /// How far the node has slipped from its anchor.
+    /// Slip of the node from its anchor.
     pub(crate) fn slip(&self, displacement: &[f64], approach: f64) -> Slip {
         let [r, z] = self.displacement(displacement, approach);
         let [along_r, along_z] = self.direction;

@@ -1,10 +1,5 @@
-//! Where displacement components stand among the equations.
-//!
-//! Numbers of the equations, and the pattern of the tangent.
-//!
-//! The symmetric linear system of a Newton step.
-//!
-//! The linear system of one Newton iteration.
+//! The symmetric linear system of one Newton iteration: numbering of the equations, sparsity
+//! pattern of the tangent, and its solution.
 
 use crate::contact::Candidate;
 use crate::element::{Elimination, OUTER};
@@ -14,11 +9,11 @@ use crate::sparse::{Factors, Pattern, Singular, Symmetric};
 use crate::surface::{DRIVER, Slip};
 use std::sync::Arc;
 
-/// Changes of the active set within a Newton iteration; more are rounding's toss between two
-/// sets.
+/// Maximum number of active-set changes within a Newton iteration. More would be switching between
+/// two sets because of rounding.
 const MAX_CHANGES: usize = 15;
 
-/// Where a displacement component's share of the system goes.
+/// Destination of a displacement component in the system.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Slot {
     Nowhere,
@@ -26,11 +21,11 @@ pub(crate) enum Slot {
     Equation(usize),
 }
 
-/// Where the entries of an element's stiffness, the lower half row by row, stand among the
-/// tangent's values. [`NO_PLACE`] where one of the two components has no equation.
+/// Indices of the entries of an element's stiffness (lower half, row by row) in the values of the
+/// tangent. [`NO_PLACE`] if one of the two components has no equation.
 type Places = [u32; OUTER * (OUTER + 1) / 2];
 
-/// Of entries that are not in the tangent.
+/// Index of entries that are not in the tangent.
 const NO_PLACE: u32 = u32::MAX;
 
 /// The slot of a displacement component of a [`Gap`](super::gap::Gap).
@@ -48,12 +43,12 @@ pub(crate) struct Chord {
     pub slots: Arc<[Slot]>,
     pub eliminations: Vec<Elimination>,
     pub factors: Factors,
-    /// Change of the equations' unknowns by a unit approach.
+    /// Change of the unknowns per unit approach.
     pub by_approach: Vec<f64>,
 }
 
 impl Chord {
-    /// `None` where the tangent is singular.
+    /// `None` if the tangent is singular.
     pub(crate) fn new(
         tangent: Tangent,
         slots: Arc<[Slot]>,
@@ -71,23 +66,23 @@ impl Chord {
     }
 }
 
-/// Equations of a model, and the tangent's pattern as far as contacts have needed it.
+/// Equations of a model, and the pattern of the tangent with the contacts so far.
 #[derive(Debug, Clone)]
 pub(crate) struct Layout {
     slots: Arc<[Slot]>,
     pub(crate) equations: usize,
-    /// Equations that are coupled with each other by an element or by a contact.
+    /// Equations that are coupled by an element or by a contact.
     groups: Vec<Vec<usize>>,
     pattern: Option<Arc<Pattern>>,
-    /// Of each element, in the pattern.
+    /// Indices of each element in the pattern.
     places: Arc<[Places]>,
-    /// The tangent taken last, with which a scene nearby converges. Elsewhere a new one is taken.
+    /// The last tangent, with which a nearby scene converges. Otherwise a new one is computed.
     pub(crate) chord: Option<Arc<Chord>>,
 }
 
 impl Layout {
     pub(crate) fn new(model: &ElementModel) -> Self {
-        // The centres, eliminated within their elements, have no equation.
+        // The centres are eliminated within their elements and have no equation.
         let mut is_outer = vec![false; model.nodes.len()];
         for nodes in &model.elements {
             for &node in &nodes[..OUTER / 2] {
@@ -136,7 +131,7 @@ impl Layout {
         Arc::clone(&self.slots)
     }
 
-    /// Equations among displacement components.
+    /// Equations of the given displacement components.
     fn coupled(&self, dofs: impl Iterator<Item = usize>) -> Vec<usize> {
         dofs.filter_map(|dof| match slot(&self.slots, dof) {
             Slot::Equation(equation) => Some(equation),
@@ -145,8 +140,8 @@ impl Layout {
         .collect()
     }
 
-    /// The tangent's pattern with couplings between the components of each contact. The one made
-    /// before where it has them all.
+    /// The pattern of the tangent with couplings between the components of each contact. The
+    /// previous pattern is reused if it contains them all.
     pub(crate) fn pattern<'a>(
         &mut self,
         elements: &[[usize; 9]],
@@ -172,7 +167,7 @@ impl Layout {
         Ok(pattern)
     }
 
-    /// Places of every element's stiffness in the pattern asked for last.
+    /// Indices of each element's stiffness in the last requested pattern.
     pub(crate) fn places(&self) -> Arc<[Places]> {
         Arc::clone(&self.places)
     }
@@ -188,7 +183,7 @@ impl Layout {
         for (place, (i, j)) in places.iter_mut().zip(pairs) {
             if let (Some(row), Some(column)) = (equations[i], equations[j]) {
                 let found = pattern.place(row, column);
-                // A tangent of 2³² entries would take 32 GB.
+                // A tangent with 2³² entries would take 32 GB.
                 *place = found.map_or(NO_PLACE, |found| found as u32);
             }
         }
@@ -196,7 +191,7 @@ impl Layout {
     }
 }
 
-/// A symmetric linear system with one more unknown, the approach.
+/// A symmetric linear system with the approach as an additional unknown.
 #[derive(Debug, Clone)]
 pub(crate) struct Tangent {
     pub matrix: Symmetric,
@@ -246,7 +241,7 @@ impl Tangent {
         });
     }
 
-    /// Adds a symmetric contribution of which the lower half is asked.
+    /// Adds a symmetric contribution, of which only the lower half is read.
     pub(crate) fn scatter(
         &mut self,
         slots: &[Slot],
@@ -279,14 +274,14 @@ impl Tangent {
         }
     }
 
-    /// Solution for a goal: the equations' unknowns and the approach's step.
+    /// Solution for a goal: the unknowns and the step of the approach.
     pub(crate) fn solve(
         &self,
         factors: &Factors,
         goal: AppliedLoad,
         present: f64,
     ) -> Result<(Vec<f64>, f64), Singular> {
-        // Two right-hand sides: the residual's, and that of a unit approach.
+        // Two right-hand sides: the residual, and a unit approach.
         let size = self.right.len();
         let mut columns = [self.right.as_slice(), &self.driver_column].concat();
         factors.solve(&mut columns)?;
@@ -310,18 +305,18 @@ impl Tangent {
 /// Residual and tangent at one state.
 ///
 /// Contact enters each Newton iteration as a linear complementarity problem: gaps are linear in the
-/// step, and which nodes are in contact is found for the step (primal–dual active set) rather than
+/// step, and the set of contact nodes is found for the step (primal–dual active set) rather than
 /// for the state before it.
 pub(crate) struct System<'a> {
     model: &'a ElementModel,
     slots: Arc<[Slot]>,
-    /// Elements' share and the turning of surfaces under their present pressure.
+    /// Contributions of the elements, and of the rotation of surfaces under their current pressure.
     base: Tangent,
-    /// Force out of balance at the state itself, with the contacts there.
+    /// Unbalanced force at the state itself, with the contacts there.
     unbalanced: Vec<f64>,
     /// Derivative of the energy by the approach.
     pub force: f64,
-    /// Root of the sum of squared element forces: what residuals are compared with.
+    /// Root of the sum of squared element forces, the reference for residuals.
     pub scale: f64,
     eliminations: Vec<Elimination>,
     candidates: Vec<Candidate>,
@@ -336,8 +331,8 @@ pub(crate) struct NewtonStep {
 }
 
 impl ElementModel {
-    /// The system at a state from which the approach may change by `margin`. `None` where an
-    /// element is turned inside out.
+    /// The system at a state from which the approach may change by `margin`. `None` if an element
+    /// is inverted.
     pub(crate) fn assemble(
         &self,
         layout: &mut Layout,
@@ -389,7 +384,7 @@ impl ElementModel {
                 base.add_slip(&slots, slip, node.weight * node.penalty);
             }
         }
-        // Residual with the contacts at this state, before their turning is added.
+        // Residual with the contacts at this state, before their rotation is added.
         let (mut unbalanced, mut force) = (base.right.clone(), base.force);
         for candidate in &candidates {
             let gap = &candidate.gap;
@@ -425,7 +420,7 @@ impl ElementModel {
 }
 
 impl System<'_> {
-    /// Unbalanced force over the scale of the forces.
+    /// Unbalanced force relative to the scale of the forces.
     pub(crate) fn imbalance(&self, goal: AppliedLoad) -> f64 {
         let squares: f64 = self.unbalanced.iter().map(|f| f * f).sum();
         let driver = match goal {
@@ -497,12 +492,12 @@ impl System<'_> {
         }
     }
 
-    /// The tangent without contacts, and what the elements eliminated.
+    /// The tangent without contacts, and the eliminations of the elements.
     pub(crate) fn into_parts(self) -> (Tangent, Arc<[Slot]>, Vec<Elimination>) {
         (self.base, self.slots, self.eliminations)
     }
 
-    /// Displacements and new pressures of all elements from the equations' solution.
+    /// Displacements and new pressures of all elements from the solution of the equations.
     fn expand(&self, solution: &[f64], approach: f64) -> NewtonStep {
         let mut displacement: Vec<f64> = self
             .slots

@@ -7,22 +7,22 @@ use tactile_elasticity::contact::{Bond, ContactCurve, ContactTable, Waveguide};
 use tactile_elasticity::laws::{ContactLaw, ContactLength, WaveguideLaw};
 use tactile_elasticity::{ElasticityError, Quantity};
 
-/// A contact whose force has grown with a higher power of the radius than this since the one
-/// before is the last of its curve: the ball has sunk in to its equator, and polynomials that
-/// follow the bend there miss 2 % of the force everywhere instead of 0.6 %.
+/// If the force has grown with a higher power of the radius than this since the previous contact,
+/// the contact is the last of its curve: the ball has sunk in to its equator. Polynomials that
+/// follow the bend there would have errors of 2 % of the force everywhere instead of 0.6 %.
 const STEEPEST: f64 = 6.0;
 
-/// The smallest a/R that is computed: at 0.1 the elements leave 0.5 % of the contact radius.
+/// The smallest computed a/R: at 0.1 the elements have an error of 0.5 % of the contact radius.
 const SMALLEST_RATIO: f64 = 0.15;
 
-/// Contacts a modulus.
+/// Number of contacts per modulus.
 const CONTACTS: usize = 16;
 
-/// A contact radius less certain than this is left out: it would miss the force by three times as
-/// much.
+/// A contact radius with a larger relative uncertainty is skipped: the error of the force would be
+/// three times as large.
 const LARGEST_UNCERTAINTY: f64 = 5e-3;
 
-/// What a table is to cover.
+/// Range of a table.
 ///
 /// ```
 /// use tactile_fem::ContactTableOptions;
@@ -43,9 +43,9 @@ pub struct ContactTableOptions {
 impl Default for ContactTableOptions {
     /// Seven moduli from 25 to 400 kPa, contact radii up to 1.25 ball radii.
     ///
-    /// Seven moduli leave less in the interpolation than the elements' own scatter of the contact
-    /// radius does (`cargo bench -p tactile-benches --features fem --bench finite_elements` prints
-    /// both).
+    /// With seven moduli the interpolation error is smaller than the scatter of the contact radius
+    /// from the elements (`cargo bench -p tactile-benches --features fem --bench finite_elements`
+    /// prints both).
     fn default() -> Self {
         Self {
             lowest_pa: 25e3,
@@ -57,12 +57,12 @@ impl Default for ContactTableOptions {
 }
 
 impl ContactTableOptions {
-    /// The smallest and the largest modulus of the ball (Pa), and how many in equal ratios. A rigid
-    /// flat needs one and takes no other.
+    /// Sets the smallest and the largest modulus of the ball (Pa), and the number of moduli in
+    /// equal ratios. A rigid flat uses a single modulus.
     ///
     /// # Errors
-    /// [`ElasticityError::NotPositive`]; [`ElasticityError::OutOfRange`] where the second is not
-    /// above the first; [`ElasticityError::LengthMismatch`] for fewer than two.
+    /// [`ElasticityError::NotPositive`]; [`ElasticityError::OutOfRange`] if the second modulus is
+    /// not above the first; [`ElasticityError::LengthMismatch`] for fewer than two moduli.
     pub fn with_moduli_pa(
         mut self,
         lowest_pa: f64,
@@ -79,7 +79,7 @@ impl ContactTableOptions {
         Ok(self)
     }
 
-    /// The largest contact radius over the ball's (default 1.25).
+    /// Sets the largest contact radius relative to the ball's (default 1.25).
     ///
     /// ```
     /// use tactile_fem::ContactTableOptions;
@@ -97,7 +97,7 @@ impl ContactTableOptions {
 
     fn moduli(&self, rigid: bool) -> Vec<f64> {
         if rigid {
-            // Forces are in proportion to the modulus: any one will do.
+            // Forces are proportional to the modulus, so any modulus will do.
             return vec![(self.lowest_pa * self.highest_pa).sqrt()];
         }
         let last = (self.moduli - 1) as f64;
@@ -108,21 +108,21 @@ impl ContactTableOptions {
     }
 }
 
-/// Radius of the guide over the ball's and over its own thickness: beyond, its rim is not felt at
-/// the contact (`the_rim_of_the_guide_is_not_felt`).
+/// Radius of the guide relative to the ball's and to its own thickness: for a larger radius its rim
+/// does not affect the contact (`the_rim_of_the_guide_is_not_felt`).
 const GUIDE_RADIUS: [f64; 2] = [4.0, 2.5];
-/// The elements' largest Poisson ratio, taken for ν = ½. It takes 0.1 to 0.2 % off the force at a
-/// given radius, less than the elements' own error. At 0.4999 the first contact of a ball of 25 kPa
-/// on a stiffer guide does not converge.
+/// The largest Poisson ratio of the elements, used for ν = ½. It reduces the force at a given
+/// radius by 0.1 to 0.2 %, less than the error of the elements. At 0.4999 the first contact of a
+/// ball of 25 kPa on a stiffer guide does not converge.
 const LARGEST_POISSON_RATIO: f64 = 0.499;
 
-/// By finite elements at finite strain, without friction, for a neo-Hookean ball of radius R (m)
-/// and Poisson ratio ν on neo-Hookean layers bonded to rigid glass, or on a rigid flat. ν above
-/// 0.499 is computed as 0.499.
+/// Computes a table by finite elements at finite strain, without friction, for a neo-Hookean ball
+/// of radius R (m) and Poisson ratio ν on neo-Hookean layers bonded to rigid glass, or on a rigid
+/// flat. ν above 0.499 is computed as 0.499.
 ///
 /// `progress` is called before each modulus and after the last, and ends the computation with
-/// [`ControlFlow::Break`]. Contacts that the solver does not reach are left out:
-/// [`ContactTable::force_n`] gives None there.
+/// [`ControlFlow::Break`]. Contacts that the solver does not reach are skipped:
+/// [`ContactTable::force_n`] is `None` there.
 ///
 /// ```
 /// use core::ops::ControlFlow;
@@ -135,8 +135,8 @@ const LARGEST_POISSON_RATIO: f64 = 0.499;
 ///     steps = progress.total;
 ///     ControlFlow::Continue(())
 /// })?;
-/// // On a rigid flat one modulus is enough; at a/R = 0.4 finite strain takes some 3 % off Hertz's
-/// // force.
+/// // On a rigid flat one modulus is enough. At a/R = 0.4 finite strain reduces Hertz's force by
+/// // about 3 %.
 /// assert_eq!(steps, 1);
 /// let hertz_n = 4.0 / 3.0 * 103e3 / (1.0 - 0.495_f64.powi(2)) * 1.2e-3_f64.powi(3) / 3e-3;
 /// let ratio = table.force_n(1.2e-3, 103e3).unwrap() / hertz_n;
@@ -148,8 +148,8 @@ const LARGEST_POISSON_RATIO: f64 = 0.499;
 /// ```
 ///
 /// # Errors
-/// [`ElasticityError::Cancelled`]; [`ElasticityError::NotReached`] where a modulus has fewer than
-/// four contacts; those of [`ContactTable::new`].
+/// [`ElasticityError::Cancelled`]; [`ElasticityError::NotReached`] if a modulus has fewer than four
+/// contacts; those of [`ContactTable::new`].
 pub fn solve_contact_table(
     radius_m: f64,
     poisson_ratio: f64,
@@ -241,7 +241,7 @@ impl Ball {
         press.on_guide(Guide::new(layers?, radius)?)?.scene()
     }
 
-    /// Forces at which the layered law expects contact radii in equal steps.
+    /// Forces for which the layered law predicts contact radii in equal steps.
     fn loads(
         &self,
         guide: &Waveguide,
@@ -268,7 +268,7 @@ impl Ball {
     }
 }
 
-/// The contact radius, if the mesh tells it well enough.
+/// The contact radius, if the mesh determines it accurately enough.
 fn certain_radius(state: &State) -> Option<f64> {
     let radius = state.contact_radius()?;
     (radius.uncertainty_m <= LARGEST_UNCERTAINTY * radius.radius_m).then_some(radius.radius_m)

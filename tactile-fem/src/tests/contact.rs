@@ -1,10 +1,10 @@
-//! Contact against Hertz's theory, and its derivatives against differences.
+//! Compares contact with Hertz's theory, and its derivatives with differences.
 
 use super::*;
 use tactile_elasticity::contact::{Bond, LayerEquation};
 
-/// A half space of four hundred contact radii of 0.1, of modulus 1. `lines` resolve the contact.
-/// The displacement at its end is 2e-3 of the approach, and so is what the approach lacks.
+/// A half space of four hundred contact radii of 0.1, with modulus 1. `lines` resolve the contact.
+/// The displacement at its end, 2e-3 of the approach, is missing from the approach.
 pub(super) fn half_space(
     poisson_ratio: f64,
     lines: &[f64],
@@ -22,7 +22,7 @@ pub(super) fn half_space(
     model
 }
 
-/// Poisson's ratio of a half space without friction, and its E/(1 − ν²).
+/// Poisson's ratio of a frictionless half space, and its E/(1 − ν²).
 const POISSON_RATIO: f64 = 0.45;
 const MODULUS: f64 = 1.0 / (1.0 - POISSON_RATIO * POISSON_RATIO);
 
@@ -40,13 +40,13 @@ fn a_rigid_paraboloid_on_a_half_space_follows_hertz() {
         let hertz = 4.0 / 3.0 * MODULUS * state.approach_m().powf(1.5);
         let by_radius = a.radius_m / (state.approach_m() * radius).sqrt();
         let by_force = state.force_n() / hertz;
-        // What some fifteen elements across the contact resolve, and the half space's end.
+        // Error of about fifteen elements across the contact, and of the end of the half space.
         assert!((by_force - 1.0).abs() < 3e-3, "{by_force}");
         assert!((by_radius - 1.0).abs() < 3e-3, "{by_radius} {a:?}");
     }
 }
 
-/// Lines densest at a punch's rim, where the pressure is singular.
+/// Lines densest at the rim of a punch, where the pressure is singular.
 pub(super) fn punch_lines(radius: f64, first: f64) -> Vec<f64> {
     let mut lines: Vec<f64> = graded(radius, 0.0, first, 1.3);
     lines.reverse();
@@ -62,7 +62,8 @@ fn a_flat_punch_on_a_half_space_follows_sneddon() {
     let model = half_space(POISSON_RATIO, &lines, 2e-4, shape);
     let state = &model.solve(&[AppliedLoad::Approach(1e-3)]).states[0];
     let sneddon = 2.0 * radius * MODULUS * 1e-3;
-    // The end of the half space takes 0.15 % of the approach, the rim's elements the rest.
+    // The end of the half space contributes 0.15 % of the approach, the elements at the rim the
+    // rest.
     let ratio = state.force_n() / sneddon;
     assert!((ratio - 1.0).abs() < 5e-3, "{ratio}");
 }
@@ -86,8 +87,8 @@ fn a_ball_on_a_bonded_layer_follows_the_linear_theory() {
     let solution = model.solve(&ratios.map(|x| AppliedLoad::Approach(x * x / radius)));
     assert_eq!(solution.report.outcome, Outcome::Solved);
     for (state, x) in solution.states.iter().zip(ratios) {
-        // The exact linear contact at the elements' own Poisson ratio, by its integral equation, at
-        // the contact radius of this approach.
+        // The exact linear contact at the Poisson ratio of the elements, by its integral equation,
+        // at the contact radius of this approach.
         let radius_of = |a: f64| {
             let layer = equation.solve(a).unwrap();
             (layer.indentation_ratio * a * a / radius, layer)
@@ -104,7 +105,7 @@ fn a_ball_on_a_bonded_layer_follows_the_linear_theory() {
         let (_, layer) = radius_of(low);
         let hertz = 4.0 / 3.0 * modulus / (1.0 - NU * NU) * low.powi(3) / radius;
         let ratio = state.force_n() / (hertz * layer.force_ratio_same_radius);
-        // What ten to twenty elements across the contact leave of the force.
+        // Error of the force with ten to twenty elements across the contact.
         assert!((ratio - 1.0).abs() < 3e-3, "{x} {ratio}");
         let by_radius = state.contact_radius().unwrap().radius_m / low;
         assert!((by_radius - 1.0).abs() < 3e-3, "{x} {by_radius}");
@@ -120,7 +121,7 @@ fn gaps_and_their_derivatives_agree_with_differences() {
     let mut fields = crate::model::ModelFields::zero(model);
     for (k, u) in fields.displacement.iter_mut().enumerate() {
         let [r, z] = model.nodes[k / 2];
-        // Smooth, curved and zero on the axis.
+        // Smooth, curved, and zero on the axis.
         *u = if k % 2 == 0 {
             0.05 * r * (1.0 + z)
         } else {
@@ -146,20 +147,21 @@ fn gaps_and_their_derivatives_agree_with_differences() {
             };
             let (plus, minus) = (shifted(1.0), shifted(-1.0));
             let first = (plus.value - minus.value) / (2.0 * step);
-            // Differences of step 1e-6: rounding 1e-10, curvature some hundreds times 1e-12.
+            // Differences with step 1e-6: rounding 1e-10, curvature several hundred times 1e-12.
             assert!(
                 (first - gap.first[i]).abs() < 1e-7,
                 "{first} {}",
                 gap.first[i]
             );
             if plus.dofs != gap.dofs || minus.dofs != gap.dofs {
-                // The closest point went to another segment.
+                // The closest point moved to another segment.
                 continue;
             }
             for j in 0..count {
                 let second = (plus.first[j] - minus.first[j]) / (2.0 * step);
                 let exact = gap.second[count * i + j];
-                // Second derivatives go with the inverse of an element's length, here up to 1e2.
+                // Second derivatives are proportional to the inverse length of an element, here up
+                // to 1e2.
                 assert!((second - exact).abs() < 1e-4, "{second} {exact}");
             }
         }

@@ -18,7 +18,7 @@ fn distorted(n: usize) -> Mesh {
     mesh
 }
 
-/// All displacements of the outer boundary are those of `field` at an approach of one.
+/// Sets all displacements of the outer boundary to those of `field` at an approach of one.
 fn clamp_to(model: &mut ElementModel, field: impl Fn([f64; 2]) -> [f64; 2]) {
     for part in model.parts.clone() {
         for edge in part.boundaries.values().flatten() {
@@ -34,12 +34,12 @@ fn clamp_to(model: &mut ElementModel, field: impl Fn([f64; 2]) -> [f64; 2]) {
     }
 }
 
-/// The axis is no boundary but for its ends.
+/// The axis belongs to the boundary only at its ends.
 fn on_boundary([r, z]: [f64; 2]) -> bool {
     r >= 1.0 || z <= 0.0 || z >= 1.0
 }
 
-/// Displacement of the manufactured solution: smooth, of finite strain, regular at the axis.
+/// Displacement of the manufactured solution: smooth, at finite strain, regular at the axis.
 fn smooth([r, z]: [f64; 2]) -> [f64; 2] {
     [
         0.03 * r * (2.0 * z).cos() * (1.0 - 0.4 * r * r),
@@ -47,12 +47,12 @@ fn smooth([r, z]: [f64; 2]) -> [f64; 2] {
     ]
 }
 
-/// First Piola–Kirchhoff stress of the manufactured solution, with its displacement gradient by
+/// First Piola–Kirchhoff stress of the manufactured solution, with the displacement gradient from
 /// differences.
 fn stress(kinematics: Kinematics, material: &Material, [r, z]: [f64; 2]) -> Gradient {
     let step = 1e-4;
     let difference = |dr: f64, dz: f64| -> [f64; 2] {
-        // Fourth order: an error of about 1e-13.
+        // Fourth order, with an error of about 1e-13.
         let at = |k: f64| smooth([r + k * step * dr, z + k * step * dz]);
         core::array::from_fn(|i| {
             (8.0 * (at(1.0)[i] - at(-1.0)[i]) - (at(2.0)[i] - at(-2.0)[i])) / (12.0 * step)
@@ -148,7 +148,8 @@ fn a_manufactured_solution_converges_with_the_third_order() {
     for (kinematics, poisson) in cases {
         let errors = [6, 12].map(|n| manufactured_error(kinematics, poisson, n));
         let order = (errors[0] / errors[1]).log2();
-        // Quadratic displacements: third order, to which this refinement is within a tenth.
+        // Quadratic displacements give third order, which this refinement approaches within a
+        // tenth.
         assert!(order > 2.8, "{kinematics:?} {poisson}: {errors:?}");
     }
 }
@@ -158,7 +159,7 @@ fn the_inverse_cube_root_is_one() {
     for k in -95..300 {
         let v = 0.01 * f64::from(k);
         let x = inverse_cube_root(v);
-        // Three products and a sum: a few rounding units.
+        // Three products and a sum: a few rounding errors.
         assert!(((1.0 + v) * x * x * x - 1.0).abs() < 2e-15, "{v}: {x}");
     }
 }

@@ -1,4 +1,4 @@
-//! Convergence of the elements and of contact, against exact solutions.
+//! Convergence of the elements and of contact to exact solutions.
 
 use crate::mesh::{Boundary, Mesh};
 use crate::model::{ElementModel, Support};
@@ -14,7 +14,7 @@ mod sparse;
 mod squeeze;
 mod stick;
 
-/// A guide of one layer.
+/// A guide with one layer.
 fn layer(thickness_m: f64, material: Material, radius_m: f64) -> Guide {
     let layer = GuideLayer {
         thickness_m,
@@ -29,7 +29,7 @@ fn ball_on_guide(radius_m: f64, material: Material, guide: &Guide) -> FemScene {
     press.on_guide(guide.clone()).unwrap().scene().unwrap()
 }
 
-/// Lines that go on where `inner` ends.
+/// Continues the lines of `inner` with those of `outer`.
 fn continued(mut inner: Vec<f64>, outer: &[f64]) -> Vec<f64> {
     let end = inner[inner.len() - 1];
     inner.extend(outer.iter().skip(1).map(|r| end + r));

@@ -1,11 +1,12 @@
-//! Stress over a stiff cylinder in silicone phantoms, as optical palpation measured it.
+//! Stress above a stiff cylinder in silicone phantoms, compared with measurements by optical
+//! palpation.
 
 use super::*;
 
-/// Thickness in mm and strain of the layer between block and plate. Contrast of the stress over
-/// the cylinder to that around it, at the layer's lower face, and its standard deviation over
-/// repeats. Optical coherence tomography of the layer, with the makers' inversion:
-/// github.com/RhysJonesResearch/Analysis_of_image_formation_in_optical_palpation.
+/// Thickness in mm and strain of the layer between block and plate, then the contrast of the stress
+/// above the cylinder to that around it, at the lower face of the layer, with its standard
+/// deviation over repeats. From optical coherence tomography of the layer, with the authors'
+/// inversion: github.com/RhysJonesResearch/Analysis_of_image_formation_in_optical_palpation.
 const MEASURED: [[f64; 4]; 6] = [
     [1.098, 0.1087, 2.6441, 0.0943],
     [1.859, 0.1031, 2.1383, 0.0980],
@@ -16,7 +17,8 @@ const MEASURED: [[f64; 4]; 6] = [
 ];
 
 /// Contrast of the mean stress within 1 mm of the axis to that from 5 to 9 mm, with faces that
-/// stick to the glass: a block of 5.4 mm with a cylinder 3.8 mm wide and 3 mm high, 1.1 mm deep.
+/// stick to the glass, for a block of 5.4 mm with a cylinder 3.8 mm wide and 3 mm high at a depth
+/// of 1.1 mm.
 fn contrast(thickness_mm: f64, strain: f64, stiffness: f64) -> f64 {
     let lines = |from: f64, to: f64, n: usize| -> Vec<f64> {
         let at = |k: usize| 1e-3 * (from + (to - from) * k as f64 / n as f64);
@@ -44,7 +46,7 @@ fn contrast(thickness_mm: f64, strain: f64, stiffness: f64) -> f64 {
     assert_eq!(solution.report.outcome, Outcome::Solved);
     let mean = |from: f64, to: f64| {
         let radii = (0..100).map(|k| 1e-3 * (from + (to - from) * (k as f64 + 0.5) / 100.0));
-        // In the layer, one hundredth of a millimetre from its face.
+        // In the layer, a hundredth of a millimetre from its face.
         let stress = |r: f64| scene.stress(&solution.states[0], [r, -1e-5]).unwrap().zz_pa;
         let sums = radii.fold([0.0; 2], |[s, w], r| [s + r * stress(r), w + r]);
         sums[0] / sums[1]
@@ -52,8 +54,8 @@ fn contrast(thickness_mm: f64, strain: f64, stiffness: f64) -> f64 {
     mean(0.0, 1.0) / mean(5.0, 9.0)
 }
 
-/// The makers found the cylinder 6 to 9 times as stiff as the block. Friction at the glass is not
-/// stated: with faces that slide contrasts are 0.2 to 0.4 lower.
+/// The authors measured the cylinder 6 to 9 times as stiff as the block. Friction at the glass is
+/// not stated: with sliding faces the contrasts are 0.2 to 0.4 lower.
 #[test]
 #[allow(clippy::print_stdout)]
 fn stiff_cylinders_in_phantoms_have_the_contrast_that_was_measured() {
@@ -61,8 +63,8 @@ fn stiff_cylinders_in_phantoms_have_the_contrast_that_was_measured() {
         let found = [6.0, 7.5, 9.0].map(|stiffness| contrast(thickness_mm, strain, stiffness));
         let apart = found.map(|found| (found - measured) / deviation);
         println!("{thickness_mm} mm: {found:.3?} for {measured} ± {deviation}, {apart:.1?}");
-        // The thinnest layer is nearly as thin as the cylinder is deep. The makers' own elements
-        // have 2.43 there, 2.3 deviations below.
+        // The thinnest layer is nearly as thin as the depth of the cylinder. The authors' own
+        // finite elements give 2.43 there, 2.3 standard deviations below.
         let limit = if thickness_mm < 1.5 { 2.0 } else { 1.5 };
         assert!(apart[1].abs() < limit, "{thickness_mm} mm: {apart:?}");
     }

@@ -1,5 +1,5 @@
-//! Presses of an object on a flat or a guide: against another program, over shapes, proportions and
-//! meshes.
+//! Presses of an object on a flat or a guide: comparison with another program, and over shapes,
+//! proportions and meshes.
 
 use super::*;
 use tactile_elasticity::ElasticityError;
@@ -32,7 +32,8 @@ fn a_ball_on_a_layered_guide_agrees_with_another_program_at_large_contact_radii(
         assert!((state.force_n() / force - 1.0).abs() < 1e-7);
         let by_radius = state.contact_radius().unwrap().radius_m / radius;
         let by_approach = state.approach_m() / approach;
-        // F grows as a^3.4 at most here: 0.3 % in the radius is 1 % in the force at a given radius.
+        // F is at most proportional to a^3.4 here: 0.3 % in the radius is 1 % in the force at a
+        // given radius.
         assert!((by_radius - 1.0).abs() < 3e-3, "{by_radius}");
         assert!((by_approach - 1.0).abs() < 4e-3, "{by_approach}");
     }
@@ -53,8 +54,8 @@ fn balls_on_guides_solve_to_contact_radii_beyond_their_own() {
         assert!(ratios.windows(2).all(|pair| pair[1] > pair[0]));
         assert!(ratios[2] > 0.95, "{ratios:?}");
         for state in &solution.states {
-            // The pressure carries the force, p² linear in r² between the points and to zero at the
-            // contact's edge.
+            // The pressure carries the force, with p² linear in r² between the points and down to
+            // zero at the edge of the contact.
             let edge = state.contact_radius().unwrap().radius_m;
             let mut nodes: Vec<[f64; 2]> = (state.pressure().iter())
                 .map(|point| [point.r_m, point.pressure_pa])
@@ -67,10 +68,10 @@ fn balls_on_guides_solve_to_contact_radii_beyond_their_own() {
                     2.0 / 3.0 * ring * (p * p + p * q + q * q) / (p + q)
                 })
                 .sum();
-            // The means that the points come from carry it exactly; a parabola's arc over a chord
-            // is what is left.
+            // The means behind the points carry it exactly. The difference is that between a
+            // parabola's arc and its chord.
             assert!((carried / state.force_n() - 1.0).abs() < 3e-3, "{carried}");
-            // It falls from the axis to the edge, point by point.
+            // It decreases from the axis to the edge, point by point.
             assert!(
                 nodes.windows(2).all(|pair| pair[1][1] < pair[0][1]),
                 "{nodes:?}"
@@ -112,8 +113,8 @@ fn objects_of_every_shape_are_pressed_on_a_flat_and_on_a_guide() {
         assert!(0.0 < soft && soft < flat, "{object:?}: {soft} {flat}");
         for (press, expected) in [(on_flat, flat), (on_guide, soft)] {
             let finer = force(&press.with_fineness(8).unwrap());
-            // A cone's tip and a cylinder's rim are singular: some tenths of a percent more than a
-            // ball.
+            // The tip of a cone and the rim of a cylinder are singular: their errors are several
+            // tenths of a per cent larger than for a ball.
             assert!(
                 (finer / expected - 1.0).abs() < 1e-2,
                 "{object:?}: {finer} {expected}"
@@ -146,7 +147,7 @@ fn presses_of_other_proportions_are_refused() {
     }
 }
 
-/// The ball's shells stay clear of its core whatever the number of elements.
+/// The shells of the ball do not intersect its core, for any number of elements.
 #[test]
 fn a_ball_can_be_meshed_at_any_fineness() {
     let ball = ObjectShape::Ball { radius_m: 3e-3 };
@@ -170,15 +171,15 @@ fn a_soft_cylinder_on_a_flat_is_stiffer_than_a_free_column() {
         .states[0];
     let column = core::f64::consts::PI * radius_m * radius_m * modulus * strain;
     let ratio = state.force_n() / column;
-    // Glued at one end, ten radii long: the end that cannot spread adds some percent, the strain
-    // itself 0.1 %.
+    // Glued at one end and ten radii long: the end that cannot spread adds a few per cent, the
+    // strain itself 0.1 %.
     assert!((1.0..1.03).contains(&ratio), "{ratio}");
 }
 
 #[test]
 fn the_rim_of_the_guide_is_not_felt() {
     let material = |modulus| Material::new(modulus, 0.495).unwrap();
-    // The thickest guide beside the ball, where the rim is nearest in thicknesses.
+    // The thickest guide compared with the ball, where the rim is nearest in units of thickness.
     for (ball, thickness_m) in [(3e-3, 10e-3), (8e-3, 10e-3)] {
         let contact = |guide_radius| {
             let guide = layer(thickness_m, material(60e3), guide_radius);
@@ -188,7 +189,7 @@ fn the_rim_of_the_guide_is_not_felt() {
         };
         let table = contact((4.0 * ball).max(2.5 * thickness_m));
         let wide = contact((8.0 * ball).max(5.0 * thickness_m));
-        // F over a cubed is what a modulus follows from.
+        // A modulus is derived from F over a cubed.
         let ratio = table.0 / wide.0 * (wide.1 / table.1).powi(3);
         assert!((ratio - 1.0).abs() < 2e-3, "{ball}: {ratio}");
     }
@@ -208,8 +209,9 @@ fn a_finer_mesh_moves_the_table_little() {
         radii.collect()
     };
     for (default, fine) in radii(5).iter().zip(radii(8)) {
-        // F at a given radius goes with its third to fourth power: estimates carry a standard error
-        // of 0.3 % for the elements, 0.09 % of the radius; this is half as much again.
+        // F at a given radius is proportional to its third to fourth power. Estimates include a
+        // standard error of 0.3 % for the elements, 0.09 % of the radius; the tolerance is half as
+        // much again.
         assert!((default / fine - 1.0).abs() < 1.4e-3, "{default} {fine}");
     }
 }

@@ -1,4 +1,5 @@
-//! Cylinders between plates against homogeneous strain and the stiffness of thin bonded discs.
+//! Compares cylinders between plates with homogeneous strain and with the stiffness of thin bonded
+//! discs.
 
 use crate::{AppliedLoad, FemScene, Interface, Material, State};
 use approx::assert_relative_eq;
@@ -13,8 +14,8 @@ fn squeezed(aspect: f64, material: Material, faces: Interface, squeeze: f64) -> 
     solution.states.into_iter().next().unwrap()
 }
 
-/// Lateral stretch and pressure of the material at an axial stretch, its sides free: σ_t = 0 solved
-/// by bisection, with σ = μ J^{−5/3} dev B + κ (J − 1).
+/// Lateral stretch and pressure of the material at an axial stretch with free sides: σ_t = 0 is
+/// solved by bisection, with σ = μ J^{−5/3} dev B + κ (J − 1).
 fn homogeneous(material: Material, axial: f64) -> (f64, f64) {
     let (mu, nu) = (material.shear_modulus(), material.poisson_ratio());
     let kappa = material.youngs_modulus_pa() / (3.0 * (1.0 - 2.0 * nu));
@@ -46,7 +47,7 @@ fn faces_that_slide_give_the_homogeneous_state() {
                 let state = squeezed(aspect, material, Interface::Frictionless, squeeze);
                 let (lateral, pressure) = homogeneous(material, 1.0 - squeeze);
                 let area = PI * (lateral * RADIUS_M).powi(2);
-                // Newton's tolerance.
+                // Tolerance of Newton's method.
                 assert_relative_eq!(state.force_n(), area * pressure, max_relative = 1e-7);
                 for point in state.pressure() {
                     assert_relative_eq!(point.pressure_pa, pressure, max_relative = 1e-6);
@@ -58,7 +59,7 @@ fn faces_that_slide_give_the_homogeneous_state() {
 
 #[test]
 fn thin_discs_that_stick_are_as_stiff_as_gent_and_lindley_say() {
-    // E(1 + 2S²) with S = R/2H, for incompressible material and S well above one; the bulk modulus,
+    // E(1 + 2S²) with S = R/2H, for incompressible material and S well above one. The bulk modulus,
     // 1,667 E, adds 1/κ to the compliance.
     let material = Material::new(1e5, 0.4999).unwrap();
     for shape in [2.0_f64, 4.0] {
@@ -68,8 +69,8 @@ fn thin_discs_that_stick_are_as_stiff_as_gent_and_lindley_say() {
         let incompressible = 1e5 * (1.0 + 2.0 * shape * shape);
         let kappa = 1e5 / (3.0 * (1.0 - 2.0 * 0.4999));
         let expected = 1.0 / (1.0 / incompressible + 1.0 / kappa);
-        // Their parabola of pressure is the leading order in the thickness; the squeeze adds some
-        // tenths of a percent.
+        // The parabola of pressure is the leading order in the thickness; the compression adds
+        // several tenths of a per cent.
         assert_relative_eq!(apparent, expected, max_relative = 0.05);
         let points = state.pressure();
         let [first, last] = [points[0], points[points.len() / 2]];

@@ -1,9 +1,9 @@
-//! Contact without slip against theory, symmetry and finer steps.
+//! Compares contact without slip with theory, symmetry and finer steps.
 
 use super::contact::{half_space, punch_lines};
 use super::*;
 
-/// Stiffness of a flat punch without slip over the one without friction (Spence 1968).
+/// Stiffness of a flat punch without slip relative to that without friction (Spence 1968).
 fn spence(poisson_ratio: f64) -> f64 {
     (1.0 - poisson_ratio) * (3.0 - 4.0 * poisson_ratio).ln() / (1.0 - 2.0 * poisson_ratio)
 }
@@ -18,18 +18,18 @@ fn a_flat_punch_without_slip_follows_spence() {
         let slides = force(&model);
         model.forbid_slip();
         let ratio = force(&model) / slides / spence(poisson_ratio);
-        // The half space's end and the rim's elements move both forces alike.
+        // The end of the half space and the elements at the rim change both forces equally.
         assert!((ratio - 1.0).abs() < 1e-3, "{poisson_ratio}: {ratio}");
     }
 }
 
-/// What sticks adds a flat punch without slip of each contact radius to the load (Mossakovskii
-/// 1963, Spence 1968), on a profile that these have lifted (Borodich and Keer 2004). With c of
-/// [`spence`], θ = ln(3 − 4ν)/2π and I(d) = ∫₀¹ sᵈ⁻¹ cos(θ ln((1 + s)/(1 − s))) ds the force of an
-/// approach is c √(2 I(2)) of Hertz's for a sphere and c I(1) of Sneddon's for a cone.
+/// Without slip, each contact radius adds the load of a flat punch without slip (Mossakovskii 1963,
+/// Spence 1968), on a profile that these punches have raised (Borodich and Keer 2004). With c of
+/// [`spence`], θ = ln(3 − 4ν)/2π and I(d) = ∫₀¹ sᵈ⁻¹ cos(θ ln((1 + s)/(1 − s))) ds, the force at an
+/// approach is c √(2 I(2)) times Hertz's for a sphere and c I(1) times Sneddon's for a cone.
 #[test]
 fn growing_contacts_without_slip_follow_their_closed_forms() {
-    // Where friction does most.
+    // Friction has its largest effect here.
     let poisson_ratio = 0.0;
     const SPHERE_AT_ZERO: f64 = 1.052_891_476_5;
     const CONE_AT_ZERO: f64 = 1.045_248_461_1;
@@ -51,7 +51,8 @@ fn growing_contacts_without_slip_follow_their_closed_forms() {
         let mut model = half_space(poisson_ratio, &lines, 0.01, shape);
         model.forbid_slip();
         let force = model.solve(&[AppliedLoad::Approach(approach)]).states[0].force_n();
-        // E/(1 − ν²) is one. Elements, loading steps and the half space's end: 0.2 % at most.
+        // E/(1 − ν²) is one. Elements, load steps and the end of the half space contribute at most
+        // 0.2 %.
         let ratio = force / expected;
         assert!((ratio - 1.0).abs() < 3e-3, "{shape:?}: {ratio}");
     }
@@ -72,7 +73,7 @@ fn solved(scene: &FemScene, loads: &[AppliedLoad]) -> Vec<State> {
     solution.states
 }
 
-/// The other body's surface and a rigid one hold a node alike.
+/// A deformable and a rigid opposite surface hold a node equally.
 #[test]
 fn a_stiff_guide_holds_as_a_rigid_flat_does() {
     let material = Material::new(103e3, 0.3).unwrap();
@@ -85,14 +86,14 @@ fn a_stiff_guide_holds_as_a_rigid_flat_does() {
     };
     let stiff = Material::new(10e6, 0.495).unwrap();
     let [rigid, stiff] = [None, Some(stiff)].map(stiffening);
-    // Friction's part of the force goes with the square of the bodies' contrast, two per cent
-    // smaller on a layer a hundred times as stiff.
+    // The effect of friction on the force is proportional to the square of the contrast of the
+    // bodies, which is two per cent smaller on a layer a hundred times as stiff.
     assert!(rigid > 1.01, "{rigid}");
     assert!((stiff / rigid - 1.0).abs() < 3e-3, "{stiff} {rigid}");
 }
 
-/// Where within a step a node touches is a guess, which moves forces by less than a thousandth and
-/// contact radii by less than two.
+/// The time of touching within a step is a guess, which changes forces by less than a thousandth
+/// and contact radii by less than two thousandths.
 #[test]
 fn more_loads_on_the_way_change_little() {
     let gel = |modulus, poisson_ratio| Material::new(modulus, poisson_ratio).unwrap();
@@ -108,7 +109,7 @@ fn more_loads_on_the_way_change_little() {
     assert!((few[1] / many[1] - 1.0).abs() < 2e-3, "{few:?} {many:?}");
 }
 
-/// Two bodies of no volume change have no tendency to slip where strains are small.
+/// Two incompressible bodies do not tend to slip at small strain.
 #[test]
 fn incompressible_bodies_do_not_feel_friction() {
     let gel = |modulus| Material::new(modulus, 0.4999).unwrap();
