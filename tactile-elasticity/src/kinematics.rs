@@ -42,7 +42,7 @@ pub struct StrainQuantities {
     /// Angle of the rotation R of F = R U: counter-clockwise from x to y in the plane, about its own
     /// axis and from 0 to π in space.
     pub rotation_rad: f64,
-    /// Its standard error.
+    /// Standard error of the rotation.
     pub rotation_error_rad: f64,
     /// Principal strains, largest first: two in the plane and 0.
     pub principal: [f64; 3],

@@ -21,9 +21,9 @@ const RIM_PX: f64 = 1.5;
 /// Relative error of slopes that is common to all presses of a calibration and therefore not
 /// visible in their scatter. It was measured on gels with known faces.
 const COMMON_ERROR: f64 = 0.012;
-/// Fewer used presses leave much of the frame and of the slopes unseen.
+/// With fewer used presses, much of the frame and of the slopes is not covered.
 const ENOUGH_PRESSES: usize = 5;
-/// Median angle in degrees beyond which lamps, pixel size or circles are in doubt.
+/// Median angle in degrees above which lamps, pixel size or circles are doubtful.
 const LARGE_ANGLE_DEG: f64 = 10.0;
 /// If the contacts reach only to a smaller fraction of the ball's radius, the ball is hardly
 /// pressed or its unit is wrong.
@@ -97,7 +97,7 @@ pub enum CalibrationDoubt {
     FlatBall(f64),
     /// A length in metres is unusually large, probably because of a wrong unit.
     LargeLength(f64),
-    /// A press, counted from 0, is no frame of the reference's sensor.
+    /// A press, counted from 0, does not come from the sensor of the reference.
     OtherFrame {
         /// The press.
         press: usize,

@@ -370,7 +370,7 @@ impl MarkerField {
     }
 
     /// Number of markers under a contact that have left its rigid motion since an earlier frame.
-    /// `covers` tells whether a position in pixels is inside the contact.
+    /// `covers` is true for positions (in pixels) inside the contact.
     ///
     /// Markers that stick to a rigid body move rigidly. The motion is that of the majority: if more
     /// than half of the markers slip, it is theirs, and a contact that slips as a whole shows no

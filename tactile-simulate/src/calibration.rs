@@ -1,5 +1,5 @@
-//! The calibration of the sensor: integrated pixel value against the force of a gauge, loading and
-//! unloading (Fig. 9).
+//! Calibration of the sensor: integrated pixel value against the force of a gauge, during loading
+//! and unloading (Fig. 9).
 
 use crate::camera::{Purpose, row_stream};
 use crate::contact::ContactModel;
@@ -11,14 +11,14 @@ use ndarray::Array2;
 use rand_distr::{Distribution, StandardNormal};
 use tactile_imaging::force::{Branch, CalibrationPair};
 
-/// An indenter is doubled so many times at most: sixteen times the radius is a sixth of the
-/// pressure.
+/// Maximum number of doublings of an indenter's radius: sixteen times the radius gives a sixth of
+/// the pressure.
 const DOUBLINGS: usize = 4;
 
-/// The camera's largest grey level.
+/// Largest grey level of the camera.
 const BRIGHTEST: f64 = 255.0;
 
-/// How a calibration is run.
+/// Options of a calibration.
 ///
 /// ```
 /// use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene};
@@ -32,23 +32,23 @@ const BRIGHTEST: f64 = 255.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CalibrationRun {
-    /// What is pressed on the sensor.
+    /// Object pressed on the sensor.
     pub indenter: ElasticSphere,
-    /// The largest force in newton.
+    /// Largest force in newtons.
     pub largest_force_n: f64,
-    /// Equal steps from 0 to the largest force. The way back takes as many.
+    /// Number of equal steps from 0 to the largest force. Unloading takes as many.
     pub steps: usize,
-    /// Standard deviation of the gauge's reading in newton.
+    /// Standard deviation of the gauge reading in newtons.
     pub gauge_noise_n: f64,
-    /// On the way back the light is that of a larger force F + 4·h·F_max·x(1 − x), x = F/F_max. The
-    /// share h is the largest difference between the branches as a share of the range. The paper
-    /// saw none.
+    /// Hysteresis h. During unloading the light is that of a larger force F + 4·h·F_max·x(1 − x),
+    /// with x = F/F_max: h is the largest difference between the branches as a fraction of the
+    /// range. The paper found none.
     pub hysteresis: f64,
 }
 
 impl Default for CalibrationRun {
-    /// A rigid sphere of 10 mm radius, 0 to 2 N in 20 steps and back, 2 mN of gauge noise, no
-    /// hysteresis.
+    /// A rigid sphere of 10 mm radius, 0 to 2 N and back in 20 steps each, 2 mN of gauge noise, and
+    /// no hysteresis.
     fn default() -> Self {
         let indenter = ElasticSphere {
             radius_m: 10e-3,
@@ -64,7 +64,7 @@ impl Default for CalibrationRun {
     }
 }
 
-/// A whole calibration.
+/// A complete calibration.
 ///
 /// ```
 /// use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene};
@@ -80,7 +80,7 @@ impl Default for CalibrationRun {
 /// let (light, force) = series.pairs.iter().fold((0.0, 0.0), |sum, p| {
 ///     (sum.0 + p.integrated_pixel_value, sum.1 + p.force_n)
 /// });
-/// let lens = 1.0 - camera.vignetting; // the most that the corners lose
+/// let lens = 1.0 - camera.vignetting; // the maximum loss in the corners
 /// let slope = force / light / series.newton_per_grey;
 /// assert!((0.99..1.01 / lens).contains(&slope));
 /// # Ok::<(), tactile_simulate::SimulateError>(())
@@ -88,18 +88,20 @@ impl Default for CalibrationRun {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct CalibrationSeries {
-    /// Sum over the pixels of frame minus reference in 8-bit grey levels, and the gauge's reading
-    /// with its noise, in the order they were taken: up and down again.
+    /// Sum over the pixels of frame minus reference in 8-bit grey levels, and the noisy gauge
+    /// reading, in the order of acquisition: loading, then unloading.
     pub pairs: Vec<CalibrationPair>,
-    /// The force itself of every pair, in newton.
+    /// True force of each pair, in newtons.
     pub true_forces_n: Vec<f64>,
-    /// Force over integrated pixel value in newton, without noise: exact for a linear response.
+    /// Force over integrated pixel value in newtons, without noise. It is exact for a linear
+    /// response.
     pub newton_per_grey: f64,
 }
 
 impl PressScene {
-    /// Calibrates the scene's sensor (waveguide, camera, light and gain) with another indenter.
-    /// Every reading is the sum over a simulated frame. The reference frame is exposed once.
+    /// Calibrates the sensor of the scene (waveguide, camera, light and gain) with another
+    /// indenter. Each reading is the sum over a simulated frame. There is a single reference
+    /// exposure.
     ///
     /// ```
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -119,9 +121,8 @@ impl PressScene {
     /// ```
     ///
     /// # Errors
-    /// [`SimulateError::OutOfRange`] for an option without meaning;
-    /// [`SimulateError::CalibrationSaturates`] where a pixel's light is beyond the
-    /// camera's range.
+    /// [`SimulateError::OutOfRange`] for an invalid option; [`SimulateError::CalibrationSaturates`]
+    /// if the light of a pixel exceeds the range of the camera.
     pub fn calibrate(&self, options: &CalibrationRun) -> Result<CalibrationSeries, SimulateError> {
         options.validate()?;
         let (camera, seed) = (self.options().camera, self.options().seed);
@@ -159,7 +160,7 @@ impl PressScene {
         })
     }
 
-    /// The calibration with an indenter of two, four, eight or sixteen times the radius where the
+    /// The calibration with two, four, eight or sixteen times the radius of the indenter, if the
     /// given one saturates the camera. A gain that suits the low pressure of a large or soft object
     /// is too high for a small rigid ball.
     ///
@@ -177,14 +178,14 @@ impl PressScene {
     /// ```
     ///
     /// # Errors
-    /// [`SimulateError::OutOfRange`] for an option without meaning;
-    /// [`SimulateError::CalibrationSaturates`] where the largest of these saturates too.
+    /// [`SimulateError::OutOfRange`] for an invalid option; [`SimulateError::CalibrationSaturates`]
+    /// if the largest indenter saturates too.
     pub fn unsaturated(
         &self,
         mut options: CalibrationRun,
     ) -> Result<CalibrationRun, SimulateError> {
         options.validate()?;
-        // Light grows with the force on both branches.
+        // Light increases with the force on both branches.
         let force_n = options.largest_force_n;
         for _ in 0..=DOUBLINGS {
             if !is_beyond_range(&self.calibration_light(options.indenter, force_n)?) {
@@ -195,13 +196,13 @@ impl PressScene {
         Err(SimulateError::CalibrationSaturates { force_n })
     }
 
-    /// The light of an indenter at a normal force.
+    /// The light of an indenter under a normal force.
     fn calibration_light(
         &self,
         indenter: ElasticSphere,
         force_n: f64,
     ) -> Result<Array2<f64>, SimulateError> {
-        // A table belongs to the scene's own object.
+        // A table is valid only for the object of the scene.
         let law = match &self.options().law {
             ContactModel::Tabulated(_) | ContactModel::FiniteElements => ContactModel::Hertz,
             closed_form => closed_form.clone(),
@@ -216,7 +217,7 @@ fn is_beyond_range(light: &Array2<f64>) -> bool {
 }
 
 impl CalibrationRun {
-    /// Up in equal steps from zero, and down again to zero.
+    /// Equal steps from zero up, and down to zero again.
     fn forces(&self) -> impl Iterator<Item = (Branch, f64)> {
         let (steps, largest) = (self.steps, self.largest_force_n);
         let force = move |k: usize| largest * k as f64 / steps as f64;
@@ -224,14 +225,14 @@ impl CalibrationRun {
         up.chain((0..steps).rev().map(move |k| (Branch::Unloading, force(k))))
     }
 
-    /// The force whose light is seen.
+    /// The force that determines the light.
     fn lit_force_n(&self, branch: Branch, force_n: f64) -> f64 {
         let x = force_n / self.largest_force_n;
         match branch {
             Branch::Loading => force_n,
             Branch::Unloading => {
-                // The parabola vanishes at both ends, where the branches meet, and is greatest
-                // half-way.
+                // The parabola vanishes at both ends, where the branches meet, and is largest in
+                // the middle.
                 force_n + 4.0 * self.hysteresis * self.largest_force_n * x * (1.0 - x)
             }
         }
@@ -242,7 +243,7 @@ impl CalibrationRun {
         positive("largest_force_n", self.largest_force_n)?;
         within("steps", self.steps as f64, 1.0, 1e6)?;
         not_negative("gauge_noise_n", self.gauge_noise_n)?;
-        // Beyond 1/4 the unloading branch would not be monotone.
+        // Above 1/4 the unloading branch would not be monotone.
         within("hysteresis", self.hysteresis, 0.0, 0.25)
     }
 }

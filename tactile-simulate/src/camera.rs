@@ -1,7 +1,5 @@
 //! From light to an 8-bit frame: blur, vignetting, photon and read noise, quantisation and
-//! saturation.
-//!
-//! One random stream per row of each frame.
+//! saturation. Each row of each frame has its own random stream.
 
 use crate::error::{SimulateError, at_least, not_negative, positive, within};
 use crate::light::Illumination;
@@ -11,17 +9,18 @@ use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, Poisson, StandardNormal};
 
-/// From this many electrons on, Poisson noise is drawn from the normal law (skewness 1/√256 =
-/// 0.06).
+/// Number of electrons from which Poisson noise is approximated by a normal distribution (skewness
+/// 1/√256 = 0.06).
 const NORMAL_FROM_ELECTRONS: f64 = 256.0;
 
 /// The camera's noise in grey levels.
 #[derive(Debug, Clone, Copy)]
 struct NoiseLaw {
-    /// Photon noise: variance over expected grey level, one over the electrons of a grey level.
+    /// Photon noise: variance over expected grey level, which is one over the number of electrons
+    /// per grey level.
     variance_per_grey: f64,
     read_variance: f64,
-    /// From here on the normal law stands for Poisson's.
+    /// Grey level from which the normal distribution replaces the Poisson distribution.
     normal_from_grey: f64,
 }
 
@@ -32,7 +31,7 @@ struct NoiseLaw {
 /// let camera = Camera { shape: [200, 300], ..Camera::default() };
 /// assert!((camera.pixel_size_m[0] - 21.55e-6).abs() < 1e-8);
 /// // 15 000 electrons at 255 grey levels: photon noise √(200/58.8), read noise 0.5 and rounding
-/// // are 1.93 together.
+/// // add up to 1.93.
 /// let light = ndarray::Array2::from_elem((200, 300), 200.0);
 /// let mean = |camera: Camera| camera.expose(light.view(), 1, 0).mapv(f64::from).mean();
 /// assert_eq!(mean(camera.ideal()), Some(200.0));
@@ -48,18 +47,18 @@ pub struct Camera {
     pub pixel_size_m: [f64; 2],
     /// Stray light without contact, in grey levels.
     pub background_grey: f64,
-    /// Barrel distortion about the frame's middle: the share by which the corners appear too close
-    /// to it. A place at the distance d from the middle is seen at the distance e with d = e (1 +
-    /// barrel (e/e_corner)²). Below 0 a pincushion.
+    /// Barrel distortion about the centre of the frame: the relative displacement of the corners
+    /// towards it. A point at the distance d from the centre appears at the distance e with d = e
+    /// (1 + barrel (e/e_corner)²). Negative values give pincushion distortion.
     pub barrel: f64,
-    /// Share of the light lost in the frame's corners. It grows with the squared distance from the
-    /// middle.
+    /// Fraction of the light lost in the corners of the frame. It grows with the squared distance
+    /// from the centre.
     pub vignetting: f64,
-    /// Standard deviation of the Gaussian point-spread function in pixels. 0 for none.
+    /// Standard deviation of the Gaussian point-spread function in pixels. 0 for no blur.
     pub blur_sigma_px: f64,
-    /// Electrons at grey level 255, which set the photon noise. Infinite for none.
+    /// Electrons at grey level 255, which determine the photon noise. Infinite for no photon noise.
     pub full_well_electrons: f64,
-    /// Standard deviation of the read noise in grey levels. 0 for none.
+    /// Standard deviation of the read noise in grey levels. 0 for no read noise.
     pub read_noise_grey: f64,
 }
 
@@ -82,8 +81,8 @@ impl Default for Camera {
 }
 
 impl Camera {
-    /// The same field of view, lens and noise of a pixel on pixels that are `factor` times as wide
-    /// and high. 0 is taken as 1. What needs no fine frame is drawn `factor²` times as fast.
+    /// The same field of view, lens and pixel noise, with pixels `factor` times as wide and high. 0
+    /// counts as 1. Scenes that need no fine frame are drawn `factor²` times as fast.
     ///
     /// ```
     /// use tactile_simulate::Camera;
@@ -100,7 +99,8 @@ impl Camera {
         }
     }
 
-    /// The same camera without blur, vignetting and noise: what is left is rounding to grey levels.
+    /// The same camera without blur, vignetting and noise. Only the rounding to grey levels
+    /// remains.
     pub fn ideal(self) -> Self {
         Self {
             vignetting: 0.0,
@@ -116,7 +116,7 @@ impl Camera {
         self.pixel_size_m[0] * self.pixel_size_m[1]
     }
 
-    /// The coordinates (x, y) of the frame's middle in pixels.
+    /// The coordinates (x, y) of the centre of the frame in pixels.
     pub(crate) fn middle_px(&self) -> [f64; 2] {
         [
             (self.shape[1] as f64 - 1.0) / 2.0,
@@ -124,7 +124,7 @@ impl Camera {
         ]
     }
 
-    /// Lens and pixels, as the image plane of a contact.
+    /// Lens and pixels in the form of an image plane.
     pub(crate) fn plane(&self) -> PixelPlane {
         let middle = self.middle_px();
         let [width, height] = self.pixel_size_m;
@@ -132,23 +132,23 @@ impl Camera {
         PixelPlane {
             middle_px: middle,
             pixel_size_m: self.pixel_size_m,
-            // A frame of one pixel has no corner to refer to.
+            // A frame of one pixel has no corner.
             bend: self.barrel / (corner * corner).max(f64::MIN_POSITIVE),
         }
     }
 
-    /// The centre asked for, or the frame's middle.
+    /// The requested centre, or the centre of the frame.
     pub(crate) fn centre_px(&self, asked: Option<[f64; 2]>) -> [f64; 2] {
         asked.unwrap_or_else(|| self.middle_px())
     }
 
-    /// Turns expected grey levels into an exposure: noise, rounding, and clipping at 0 and 255.
-    /// Each (`seed`, `frame`) has its own noise. A caller may pass any image. O(pixels).
+    /// Converts expected grey levels into an exposure: noise, rounding, and clipping at 0 and 255.
+    /// Each pair (`seed`, `frame`) has its own noise. Any image may be passed. O(pixels).
     pub fn expose(&self, expected_grey: ArrayView2<'_, f64>, seed: u64, frame: u64) -> Array2<u8> {
         self.expose_for(Purpose::Frames, expected_grey, seed, frame)
     }
 
-    /// [`expose`](Self::expose) with the streams of another purpose.
+    /// Like [`expose`](Self::expose), with the random streams of another purpose.
     pub(crate) fn expose_for(
         &self,
         purpose: Purpose,
@@ -166,7 +166,7 @@ impl Camera {
         {
             let mut rng = row_stream(seed, purpose, frame, row);
             for (pixel, &grey) in out.iter_mut().zip(light) {
-                // `as` cuts towards zero and saturates at 0 and 255.
+                // `as` truncates towards zero and saturates at 0 and 255.
                 *pixel = (self.noisy(grey, &law, &mut rng) + 0.5) as u8;
             }
         }
@@ -180,8 +180,8 @@ impl Camera {
     fn noisy(&self, grey: f64, law: &NoiseLaw, rng: &mut ChaCha8Rng) -> f64 {
         let normal: f64 = StandardNormal.sample(rng);
         if grey >= law.normal_from_grey {
-            // Photon and read noise are independent, so their variances add and one deviate draws
-            // both.
+            // Photon and read noise are independent, so their variances add and one deviate
+            // represents both.
             return grey + (grey * law.variance_per_grey + law.read_variance).sqrt() * normal;
         }
         let photons = match Poisson::new(grey / law.variance_per_grey) {
@@ -199,9 +199,9 @@ impl Camera {
         }
     }
 
-    /// Pixels that a patch must reach beyond the contact so that the blur has all its light.
+    /// Margin in pixels around the contact that contains all of the blurred light.
     pub(crate) fn blur_reach(&self) -> usize {
-        // Beyond four standard deviations lie 6e-5 of a Gaussian's weight.
+        // Four standard deviations exclude 6e-5 of a Gaussian's weight.
         (4.0 * self.blur_sigma_px).ceil() as usize
     }
 
@@ -212,10 +212,11 @@ impl Camera {
             return;
         }
         let weight = |k: usize| (-0.5 * (k as f64 / self.blur_sigma_px).powi(2)).exp();
-        // The weights that are kept add up to 1, so that the blur keeps the sum of the light.
+        // The truncated weights are normalised to 1, so that the blur preserves the sum of the
+        // light.
         let total = 1.0 + 2.0 * (1..=reach).map(weight).sum::<f64>();
         let kernel: Vec<f64> = (0..=reach).map(|k| weight(k) / total).collect();
-        // A Gaussian is separable: two passes of one dimension replace one of two.
+        // A Gaussian is separable: two one-dimensional passes replace a two-dimensional one.
         for axis in [Axis(0), Axis(1)] {
             let source = patch.values.clone();
             patch.values.map_inplace(|v| *v *= kernel[0]);
@@ -253,7 +254,7 @@ impl Camera {
             patch.add_to(&mut frame);
         }
         let [cx, cy] = self.middle_px();
-        // Relative to the corner, where the loss is the share stated.
+        // Relative to the corner, where the loss equals the stated fraction.
         let fall = self.vignetting / (cx * cx + cy * cy).max(f64::MIN_POSITIVE);
         let tilt = [
             illumination.tilt[0] / (2.0 * cx).max(1.0),
@@ -264,16 +265,16 @@ impl Camera {
             for (c, value) in line.iter_mut().enumerate() {
                 let dx = c as f64 - cx;
                 let lens = 1.0 - fall * (dx * dx + dy * dy);
-                // A strong tilt must not turn the light negative on the dark side.
+                // A strong tilt must not make the light negative on the dark side.
                 *value *= lens * (illumination.level + tilt[0] * dx + tilt[1] * dy).max(0.0);
             }
         }
         frame
     }
 
-    /// An exposure of a target instead of the sensing surface: bright dots of a third of the pitch
-    /// (in metres) in diameter on a square grid. They lie 180 grey levels above the background,
-    /// behind the same lens, blur, vignetting and noise.
+    /// An exposure of a target instead of the sensing surface: bright dots on a square grid, with a
+    /// diameter of a third of the pitch (in metres). They are 180 grey levels above the background,
+    /// with the same lens, blur, vignetting and noise.
     ///
     /// ```
     /// use tactile_simulate::Camera;
@@ -288,7 +289,7 @@ impl Camera {
         const STEPS: i32 = 4;
         let plane = self.plane();
         let lit = |pixel: [f64; 2]| {
-            // The middle of the frame lies between dots, as it would by chance.
+            // The centre of the frame lies between dots, as it would by chance.
             let place = plane.to_metres(pixel).map(|p| p / pitch_m + 0.3);
             let from_dot = place.map(|p| p - p.round());
             f64::from(from_dot[0].hypot(from_dot[1]) < 1.0 / 6.0)
@@ -328,7 +329,7 @@ impl Camera {
 
     pub(crate) fn validate(&self) -> Result<(), SimulateError> {
         at_least("shape", self.shape[0].min(self.shape[1]), 1)?;
-        // A row's number takes 16 bits of its noise stream's number.
+        // The row number takes 16 bits of the number of its noise stream.
         within(
             "shape",
             self.shape[0].max(self.shape[1]) as f64,
@@ -338,7 +339,7 @@ impl Camera {
         positive("pixel_size_m", self.pixel_size_m[0])?;
         positive("pixel_size_m", self.pixel_size_m[1])?;
         not_negative("background_grey", self.background_grey)?;
-        // Beyond, the image folds over in the corners.
+        // Outside this range the image folds in the corners.
         within("barrel", self.barrel, -0.3, 0.3)?;
         within("vignetting", self.vignetting, 0.0, 1.0)?;
         within("blur_sigma_px", self.blur_sigma_px, 0.0, 1000.0)?;
@@ -352,7 +353,7 @@ impl Camera {
     }
 }
 
-/// What a stream is used for. Streams of different uses never meet.
+/// The use of a random stream. Streams of different uses are independent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Purpose {
@@ -362,17 +363,17 @@ pub(crate) enum Purpose {
     Gauge = 1,
     /// Noise of the frames of a calibration.
     CalibrationFrames = 2,
-    /// Where the bumps of a surface pattern lie.
+    /// Positions of the bumps of a surface pattern.
     Pattern = 3,
 }
 
-/// The stream of row `row` of frame `frame`. `frame` must stay below 2⁴⁸, `row` below 2¹⁶.
+/// The stream of row `row` in frame `frame`. `frame` must be below 2⁴⁸, `row` below 2¹⁶.
 pub(crate) fn row_stream(seed: u64, purpose: Purpose, frame: u64, row: usize) -> ChaCha8Rng {
     let mut key = [0_u8; 32];
     key[..8].copy_from_slice(&seed.to_le_bytes());
     key[8] = purpose as u8;
     let mut rng = ChaCha8Rng::from_seed(key);
-    // Seed and purpose make the key, frame and row the stream: no two of them share numbers.
+    // Seed and purpose are the key, frame and row the stream, so that no two of them share numbers.
     rng.set_stream(frame << 16 | row as u64);
     rng
 }

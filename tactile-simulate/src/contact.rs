@@ -1,8 +1,8 @@
 //! A sphere pressed on the waveguide: pressure, contact radius, indentation and surface
 //! displacement.
 //!
-//! The contact at a force comes from a closed form or from states computed elsewhere, which are
-//! numbers over the radius. States by finite elements for two balls come with the crate.
+//! The contact at a force follows from a closed form or from tabulated states over the radius.
+//! States by finite elements for two balls are included in the crate.
 
 use crate::error::{SimulateError, at_least, finite, not_negative, positive, within};
 use crate::materials::{Elastic, ElasticSphere, LightGuide};
@@ -10,11 +10,11 @@ use std::borrow::Cow;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Largest relative difference allowed between a state's force and the integral of its pressure.
-/// Finite-element pressures recovered at nodes miss the force by up to some percent where the
-/// mesh is coarse. A wrong unit misses it by far more.
+/// Finite-element pressures recovered at nodes deviate by up to several per cent if the mesh is
+/// coarse. A wrong unit gives a much larger difference.
 const LARGEST_FORCE_MISMATCH: f64 = 0.05;
 
-/// R of the balls.
+/// Radius R of the balls.
 const RADIUS_M_LIMIT: f64 = 3e-3;
 
 /// The contact at one load.
@@ -49,7 +49,7 @@ const RADIUS_M_LIMIT: f64 = 3e-3;
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct SimulatedContact {
-    /// Normal force in newton.
+    /// Normal force in newtons.
     pub force_n: f64,
     /// Radius of the undeformed sphere in metres.
     pub sphere_radius_m: f64,
@@ -61,9 +61,9 @@ pub struct SimulatedContact {
     pub peak_pressure_pa: f64,
     /// E* of 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂, in pascal.
     pub effective_modulus_pa: f64,
-    /// The waveguide's share E*·(1 − ν₂²)/E₂ of the indentation, 0 to 1.
+    /// Fraction E*·(1 − ν₂²)/E₂ of the indentation due to the waveguide, 0 to 1.
     pub waveguide_share: f64,
-    /// The state at this force where the contact was computed elsewhere.
+    /// The state at this force, for a tabulated contact.
     #[cfg_attr(feature = "serde", serde(skip))]
     given: Option<ContactState>,
 }
@@ -72,7 +72,7 @@ impl SimulatedContact {
     /// The contact of `sphere` on `waveguide` at `force_n` ≥ 0.
     ///
     /// # Errors
-    /// [`SimulateError::OutOfRange`] for a force beyond the last state of a tabulated contact.
+    /// [`SimulateError::OutOfRange`] for a force above the last state of a tabulated contact.
     pub(crate) fn new(
         sphere: &ElasticSphere,
         waveguide: &LightGuide,
@@ -83,7 +83,7 @@ impl SimulatedContact {
         within("the force in N", force_n, 0.0, largest)?;
         let hertz = Self::hertz(sphere, waveguide, force_n);
         if let Some(states) = law.states(sphere, waveguide)? {
-            // Without force there is no state to scale down to: the contact then is Hertz's of
+            // Without force there is no state to scale from; the contact is then Hertz's with
             // radius 0.
             let state = (force_n > 0.0).then(|| ContactState::at_force(&states, force_n));
             return Ok(match state.flatten() {
@@ -128,8 +128,8 @@ impl SimulatedContact {
 
     fn with_state(self, state: ContactState) -> Self {
         Self {
-            // The effective modulus and the guide's share stay Hertz's: a state has none of its
-            // own.
+            // The effective modulus and the fraction of the guide are Hertz's, because a state has
+            // none.
             contact_radius_m: state.contact_radius_m,
             indentation_m: state.indentation_m,
             peak_pressure_pa: state.peak_pressure_pa(),
@@ -138,13 +138,13 @@ impl SimulatedContact {
         }
     }
 
-    /// Whether the pressure is Hertz's, p₀ √(1 − r²/a²).
+    /// Whether the pressure is Hertzian, p₀ √(1 − r²/a²).
     pub(crate) fn is_hertzian(&self) -> bool {
         self.given.is_none()
     }
 
-    /// Pressure at distance `r_m` from the centre, in pascal: p₀ √(1 − r²/a²) for a closed form,
-    /// else that of the given state.
+    /// Pressure at distance `r_m` from the centre, in pascals: p₀ √(1 − r²/a²) for a closed form,
+    /// otherwise that of the state.
     pub fn pressure_pa(&self, r_m: f64) -> f64 {
         let a = self.contact_radius_m;
         if r_m >= a {
@@ -152,20 +152,20 @@ impl SimulatedContact {
         }
         match &self.given {
             Some(state) => state.pressure_at_pa(r_m),
-            // The product keeps the digits near the rim, where a² − r² cancels.
+            // The product keeps its digits near the rim, where a² − r² cancels.
             None => self.peak_pressure_pa * ((a - r_m) * (a + r_m)).sqrt() / a,
         }
     }
 
-    /// a/R: Hertz's law holds while this is small (warn beyond 0.3).
+    /// a/R. Hertz's law is valid while this ratio is small (a warning is given above 0.3).
     pub fn contact_ratio(&self) -> f64 {
         self.contact_radius_m / self.sphere_radius_m
     }
 
-    /// Height of the *apparent* surface: the pressure read as the shading of a frontally lit
-    /// Lambertian surface, z(r) = ∫ᵣᵃ √((p₀/p)² − 1) dr with p₀ the largest pressure. Hertz's
-    /// pressure gives exactly a hemisphere of radius a, z = √(a² − r²), whatever the sphere's
-    /// radius and modulus. Zero outside.
+    /// Height of the *apparent* surface: the pressure interpreted as the shading of a frontally lit
+    /// Lambertian surface, z(r) = ∫ᵣᵃ √((p₀/p)² − 1) dr with the largest pressure p₀. Hertz's
+    /// pressure gives exactly a hemisphere of radius a, z = √(a² − r²), for any radius and modulus
+    /// of the sphere. Zero outside.
     pub fn apparent_height_m(&self, r_m: f64) -> f64 {
         let a = self.contact_radius_m;
         if r_m >= a {
@@ -174,14 +174,15 @@ impl SimulatedContact {
         let Some(state) = &self.given else {
             return ((a - r_m) * (a + r_m)).sqrt();
         };
-        // With r = a sin φ the integrand stays finite at the rim, where p falls as √(a − r). The
-        // midpoint rule leaves out the rim itself, where the ratio is infinite.
+        // With r = a sin φ the integrand is finite at the rim, where p falls as √(a − r). The
+        // midpoint rule avoids the rim itself, where the ratio is infinite.
         const STEPS: usize = 64;
         let first = (r_m / a).asin();
         let step = (FRAC_PI_2 - first) / STEPS as f64;
         let slope_at = |phi: f64| {
             let ratio = self.peak_pressure_pa / state.pressure_at_pa(a * phi.sin());
-            // Interpolation can exceed the largest sample by rounding, hence the guard of the root.
+            // By rounding, interpolation can exceed the largest sample, hence the lower limit of
+            // the root's argument.
             (ratio * ratio - 1.0).max(0.0).sqrt() * a * phi.cos()
         };
         let angles = (0..STEPS).map(|k| first + (k as f64 + 0.5) * step);
@@ -189,8 +190,8 @@ impl SimulatedContact {
     }
 
     /// Vertical displacement in metres of the waveguide's surface at distance `r_m` from the
-    /// centre, negative under the object. Of a closed form it is the waveguide's share of the joint
-    /// displacement under Hertz's pressure, else that of the given state.
+    /// centre, negative under the object. For a closed form it is the waveguide's fraction of the
+    /// joint displacement under Hertz's pressure, otherwise that of the state.
     pub(crate) fn waveguide_height_m(&self, r_m: f64) -> f64 {
         match &self.given {
             Some(state) => state.height_at_m(r_m),
@@ -199,29 +200,30 @@ impl SimulatedContact {
         }
     }
 
-    /// Sum of both surfaces' normal displacements at distance r (Johnson, eqs. 3.41a and 3.42a).
+    /// Sum of the normal displacements of both surfaces at distance r (Johnson, eqs. 3.41a and
+    /// 3.42a).
     fn joint_displacement_m(&self, r: f64) -> f64 {
         let (a, p0, e) = (
             self.contact_radius_m,
             self.peak_pressure_pa,
             self.effective_modulus_pa,
         );
-        // The profile is a paraboloid inside and the field of the whole load outside, equal at r =
-        // a.
+        // The profile is a paraboloid inside and the field of the whole load outside. They are
+        // equal at r = a.
         if r <= a {
             return PI * p0 * (2.0 * a * a - r * r) / (4.0 * a * e);
         }
         let q = a / r;
         if q < 0.02 {
-            // (2q² − 1) asin q + q√(1 − q²) = (4/3) q³ (1 + q²/10 + 9q⁴/280 + …), far field of a
-            // point force.
+            // (2q² − 1) asin q + q√(1 − q²) = (4/3) q³ (1 + q²/10 + 9q⁴/280 + …), the far field of
+            // a point force.
             return 2.0 * p0 * a * q / (3.0 * e) * (1.0 + q * q * (0.1 + q * q * (9.0 / 280.0)));
         }
         p0 * a / (2.0 * e) * ((2.0 - 1.0 / (q * q)) * q.asin() + ((1.0 - q) * (1.0 + q)).sqrt() / q)
     }
 }
 
-/// Where pressure, contact radius and indentation at a force come from.
+/// Source of pressure, contact radius and indentation at a force.
 ///
 /// ```
 /// use tactile_simulate::{ContactModel, PressOptions, PressScene};
@@ -233,7 +235,7 @@ impl SimulatedContact {
 /// assert_eq!(hertz.indentation_m, hertz.contact_radius_m.powi(2) / hertz.sphere_radius_m);
 /// assert_eq!(tatara.contact_radius_m, hertz.contact_radius_m);
 /// assert!(tatara.indentation_m < hertz.indentation_m);
-/// // 0.7 N: a/R is 0.92. Springs in series make the layers too soft.
+/// // At 0.7 N, a/R is 0.92. Springs in series underestimate the stiffness of the layers.
 /// let solved = contact(ContactModel::FiniteElements)?;
 /// assert!(
 ///     (solved.contact_radius_m / 2.75e-3 - 1.0).abs() < 0.01
@@ -245,30 +247,32 @@ impl SimulatedContact {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum ContactModel {
-    /// Hertz (1882): a³ = 3FR/(4E*), δ = a²/R. Small contact, a ≪ R. The simulator obeys it at any
-    /// load.
+    /// Hertz (1882): a³ = 3FR/(4E*), δ = a²/R. It is valid for small contacts, a ≪ R; the simulator
+    /// applies it at any load.
     #[default]
     Hertz,
-    /// Tatara (1991), first extension of Hertz to a sphere squeezed between two surfaces: Hertz's
-    /// radius and pressure, but the approach is lessened by the displacement that the opposite
-    /// contact's force causes, δ = a²/R − F/(πE₁)·[(1 − ν₁²)/√(a² + 4R²) + 2(1 + ν₁)R²/(a² +
-    /// 4R²)^{3/2}]. Only the sphere's own material (E₁, ν₁) enters the correction: the waveguide is
-    /// loaded on one side. His stiffening of rubber and the lateral spread of the contact are not
-    /// included.
+    /// Tatara (1991), first extension of Hertz to a sphere compressed between two surfaces. Radius
+    /// and pressure are Hertz's, but the approach is reduced by the displacement due to the force
+    /// of the opposite contact: δ = a²/R − F/(πE₁)·[(1 − ν₁²)/√(a² + 4R²) + 2(1 + ν₁)R²/(a² +
+    /// 4R²)^{3/2}]. Only the sphere's material (E₁, ν₁) enters the correction, because the
+    /// waveguide is loaded on one side. The stiffening of rubber and the lateral spread of the
+    /// contact are not included.
     ///
     /// Y. Tatara, J. Eng. Mater. Technol. 113 (1991) 285–291.
     Tatara,
     /// Finite elements at finite strain: the contacts of a ball of 3 mm of
     /// [`CL2000X`](crate::Elastic::CL2000X) or [`CL2003X`](crate::Elastic::CL2003X) on the [default
-    /// waveguide](crate::LightGuide::default) up to 1.3 N, neo-Hookean and without friction, as
-    /// `examples/contact_states.rs` computes them. Another ball or waveguide is refused: give its
-    /// contacts as [`Tabulated`](Self::Tabulated). Between the states as there.
+    /// waveguide](crate::LightGuide::default) up to 1.3 N, neo-Hookean and without friction,
+    /// computed by `examples/contact_states.rs`. Other balls or waveguides are rejected: pass their
+    /// contacts as [`Tabulated`](Self::Tabulated). The interpolation between the states is the same
+    /// as there.
     FiniteElements,
-    /// States computed elsewhere, with growing force. A load at a state's force is that state.
-    /// Between two states radius, pressure over its mean, and height over F^⅔ at equal r/a are
-    /// linear in F^⅓. Below the first, that one shrinks as Hertz's contact does. A load beyond the
-    /// last state is refused. [`PressScene::calibrate`](crate::PressScene::calibrate), which
-    /// presses another object, takes Hertz's law.
+    /// States computed elsewhere, in ascending order of force. At the force of a state, the contact
+    /// equals this state. Between two states, the radius, the pressure over its mean, and the
+    /// height over F^⅔ at equal r/a are linear in F^⅓. Below the first state, the contact is scaled
+    /// by Hertz's laws. A load above the last state is rejected.
+    /// [`PressScene::calibrate`](crate::PressScene::calibrate), which presses another object, uses
+    /// Hertz's law.
     Tabulated(Vec<ContactState>),
 }
 
@@ -279,7 +283,7 @@ impl ContactModel {
         };
         at_least("states", states.len(), 1)?;
         states.iter().try_for_each(ContactState::validate)?;
-        // Equal forces would leave no interval to interpolate in.
+        // Equal forces would leave no interval for interpolation.
         for pair in states.windows(2) {
             within(
                 "the force in N",
@@ -291,7 +295,7 @@ impl ContactModel {
         Ok(())
     }
 
-    /// The largest force with a contact.
+    /// The largest force with a defined contact.
     ///
     /// # Errors
     /// [`SimulateError::NoFiniteElements`].
@@ -302,11 +306,11 @@ impl ContactModel {
     ) -> Result<f64, SimulateError> {
         let states = self.states(sphere, waveguide)?;
         let largest = |last: &ContactState| last.force_n * (1.0 + EQUAL_FORCES);
-        // A closed form holds at any force. A table ends at its last state.
+        // A closed form is defined for any force; a table ends at its last state.
         Ok(states.map_or(f64::MAX, |s| s.last().map_or(0.0, largest)))
     }
 
-    /// The states of a contact computed elsewhere. None for a closed form.
+    /// The states of a tabulated contact. `None` for a closed form.
     ///
     /// # Errors
     /// [`SimulateError::NoFiniteElements`].
@@ -328,7 +332,7 @@ impl ContactModel {
     }
 }
 
-/// What the opposite contact takes off the approach by [`ContactModel::Tatara`], in metres.
+/// Reduction of the approach by the opposite contact for [`ContactModel::Tatara`], in metres.
 fn far_side_m(sphere: &ElasticSphere, force_n: f64, a: f64) -> f64 {
     let (nu, r) = (sphere.material.poisson_ratio, sphere.radius_m);
     let d = (a * a + 4.0 * r * r).sqrt();
@@ -336,16 +340,16 @@ fn far_side_m(sphere: &ElasticSphere, force_n: f64, a: f64) -> f64 {
         * ((1.0 - nu) * (1.0 + nu) / d + 2.0 * (1.0 + nu) * r * r / (d * d * d))
 }
 
-/// Forces that differ by no more than this part are one: a solver meets the force that it was asked
-/// for within its tolerance.
+/// Forces with a smaller relative difference count as equal: a solver reaches a requested force
+/// within its tolerance.
 const EQUAL_FORCES: f64 = 1e-9;
 
-/// An axisymmetric contact at one load, computed by other means: finite elements, integral
-/// equations, a measurement.
+/// An axisymmetric contact at one load, computed by other means, such as finite elements, integral
+/// equations or a measurement.
 ///
-/// The columns are samples over the distance r from the contact's axis in the deformed
+/// The columns are samples over the distance r from the axis of the contact in the deformed
 /// configuration. Between samples p² is linear in r², which is exact for Hertz's √(1 − r²/a²) and
-/// follows the square-root fall at any rim. Heights are linear in r. The pressure is scaled to
+/// follows the square-root decay at any rim. Heights are linear in r. The pressure is scaled to
 /// carry `force_n` exactly.
 ///
 /// ```
@@ -378,16 +382,16 @@ const EQUAL_FORCES: f64 = 1e-9;
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ContactState {
-    /// Normal force in newton.
+    /// Normal force in newtons.
     pub force_n: f64,
-    /// Radius of the contact in metres. The pressure is taken as 0 from here on.
+    /// Radius of the contact in metres. The pressure is zero from this radius on.
     pub contact_radius_m: f64,
     /// Approach of the two bodies in metres.
     pub indentation_m: f64,
-    /// Distances from the axis in metres: 0 first, then growing, beyond the contact's rim at the
-    /// last or at it.
+    /// Distances from the axis in metres, ascending from 0. The last one is at least the contact
+    /// radius.
     pub radius_m: Vec<f64>,
-    /// Contact pressure in pascal at each distance.
+    /// Contact pressure in pascals at each distance.
     pub pressure_pa: Vec<f64>,
     /// Vertical displacement in metres of the waveguide's surface at each distance, negative under
     /// the object.
@@ -413,12 +417,12 @@ impl ContactState {
                 });
             }
         }
-        // The pressure at the centre must be a sample, since nothing is extrapolated inwards.
+        // The pressure at the centre must be a sample, because there is no extrapolation inwards.
         within("radius_m", self.radius_m[0], 0.0, 0.0)?;
         for pair in self.radius_m.windows(2) {
             positive("radius_m", pair[1] - pair[0])?;
         }
-        // Without the rim inside the table the last sample's pressure would have to be guessed.
+        // If the rim were outside the table, the pressure beyond the last sample would be unknown.
         let last = self.radius_m[samples - 1];
         within(
             "contact_radius_m",
@@ -439,23 +443,23 @@ impl ContactState {
         )
     }
 
-    /// The same state with its pressure scaled to carry its force exactly.
+    /// The same state, with its pressure scaled to carry its force exactly.
     fn balanced(mut self) -> Self {
         let scale = self.force_n / self.carried_force_n();
         self.pressure_pa.iter_mut().for_each(|p| *p *= scale);
         self
     }
 
-    /// ∫ p dS as interpolated: with q = p² linear in s = r², π ∫ √q ds over a stretch from q₀ to q₁
-    /// is (2π/3)·Δs·(q₀ + √(q₀q₁) + q₁)/(√q₀ + √q₁).
+    /// ∫ p dS with this interpolation: for q = p² linear in s = r², π ∫ √q ds over an interval from
+    /// q₀ to q₁ is (2π/3)·Δs·(q₀ + √(q₀q₁) + q₁)/(√q₀ + √q₁).
     pub(crate) fn carried_force_n(&self) -> f64 {
         let rim = self.contact_radius_m;
         let mut force = 0.0;
         for pair in self.radius_m.windows(2) {
-            // A stretch that reaches past the rim counts up to it, one beyond has no width.
+            // An interval that extends past the rim is cut there; one outside has zero width.
             let [from, to] = [pair[0].min(rim), pair[1].min(rim)];
             let [p0, p1] = [self.sampled_pressure_pa(from), self.sampled_pressure_pa(to)];
-            // In terms of p the rule needs no root, but 0/0 must be kept out.
+            // In terms of p the rule needs no root, but 0/0 must be avoided.
             if p0 + p1 > 0.0 {
                 let mean = (p0 * p0 + p0 * p1 + p1 * p1) / (p0 + p1);
                 force += 2.0 * PI / 3.0 * (to * to - from * from) * mean;
@@ -464,13 +468,13 @@ impl ContactState {
         force
     }
 
-    /// The sample that begins the stretch in which `r_m` lies.
+    /// The sample at the start of the interval that contains `r_m`.
     fn stretch(&self, r_m: f64) -> usize {
         let not_beyond = self.radius_m.partition_point(|&r| r <= r_m);
         not_beyond.saturating_sub(1).min(self.radius_m.len() - 2)
     }
 
-    /// Pressure at a distance from the axis, in pascal. 0 from the rim on.
+    /// Pressure at a distance from the axis, in pascals. 0 from the rim on.
     pub(crate) fn pressure_at_pa(&self, r_m: f64) -> f64 {
         if r_m >= self.contact_radius_m {
             0.0
@@ -482,8 +486,8 @@ impl ContactState {
     fn sampled_pressure_pa(&self, r_m: f64) -> f64 {
         let k = self.stretch(r_m);
         let [q0, q1] = [self.pressure_pa[k].powi(2), self.pressure_pa[k + 1].powi(2)];
-        // The rim mostly lies between two samples: the pressure falls to zero there, not at the
-        // sample beyond.
+        // The rim usually lies between two samples: the pressure falls to zero there, not at the
+        // next sample.
         let last = self.radius_m[k + 1];
         let end = if q1 == 0.0 {
             last.min(self.contact_radius_m)
@@ -491,7 +495,7 @@ impl ContactState {
             last
         };
         let [from, to] = [self.radius_m[k].powi(2), end * end];
-        // The rim may coincide with the sample before it: the stretch is then empty.
+        // The rim may coincide with the previous sample, so that the interval is empty.
         let t = if to > from {
             ((r_m * r_m - from) / (to - from)).clamp(0.0, 1.0)
         } else {
@@ -500,8 +504,8 @@ impl ContactState {
         (q0 + t * (q1 - q0)).sqrt()
     }
 
-    /// Height at a distance from the axis, in metres. Beyond the last sample it falls off as 1/r, a
-    /// point load's displacement.
+    /// Height at a distance from the axis, in metres. Outside the last sample it decays as 1/r,
+    /// like the displacement of a point load.
     pub(crate) fn height_at_m(&self, r_m: f64) -> f64 {
         let last = self.radius_m.len() - 1;
         if r_m > self.radius_m[last] {
@@ -513,19 +517,19 @@ impl ContactState {
         self.height_m[k] + t * (self.height_m[k + 1] - self.height_m[k])
     }
 
-    /// The largest pressure of the table, in pascal.
+    /// The largest pressure of the table, in pascals.
     fn peak_pressure_pa(&self) -> f64 {
         (self.radius_m.iter().copied())
             .map(|r| self.pressure_at_pa(r))
             .fold(0.0, f64::max)
     }
 
-    /// The state at `force_n` > 0 among `states` of growing force: one of them where the force is
-    /// its own, else between two of them. Linear in F^⅓ are a, p over its mean, z/F^⅔ and δ/F^⅔.
-    /// Below the first, that one shrunk by Hertz's scaling, a ∝ F^⅓ and z ∝ F^⅔. None above the
+    /// The state at `force_n` > 0 from `states` of ascending force: one of them if the force
+    /// matches, otherwise an interpolation. a, p over its mean, z/F^⅔ and δ/F^⅔ are linear in F^⅓.
+    /// Below the first state, it is scaled by Hertz's laws, a ∝ F^⅓ and z ∝ F^⅔. `None` above the
     /// last.
     pub(crate) fn at_force(states: &[Self], force_n: f64) -> Option<Self> {
-        // The first state at or above the force, one within the tolerance included.
+        // The first state at or above the force, including one within the tolerance.
         let next = states.partition_point(|s| s.force_n < force_n * (1.0 - EQUAL_FORCES));
         let upper = states.get(next)?;
         let scale = (force_n / upper.force_n).cbrt();
@@ -555,10 +559,11 @@ impl ContactState {
         }
     }
 
-    /// The state at `force_n`, `t` of the way from `lower` to `upper`, at equal r/a.
+    /// The state at `force_n`, at the fraction `t` from `lower` to `upper`, for equal r/a.
     fn between(lower: &Self, upper: &Self, t: f64, force_n: f64) -> Self {
         let mix = |of: &dyn Fn(&Self) -> f64| of(lower) + t * (of(upper) - of(lower));
-        // What Hertz's laws leave constant is mixed: z/F^⅔, δ/F^⅔, and p over its mean.
+        // The interpolated quantities are constant under Hertz's laws: z/F^⅔, δ/F^⅔, and p over its
+        // mean.
         let depth = |force_n: f64| force_n.cbrt().powi(2);
         let mean_pressure = |force_n: f64, radius_m: f64| force_n / (PI * radius_m * radius_m);
         let contact_radius_m = mix(&|s| s.contact_radius_m);
@@ -573,7 +578,7 @@ impl ContactState {
             let normalised = mix(&|s| s.height_at_m(ratio * s.contact_radius_m) / depth(s.force_n));
             normalised * depth(force_n)
         };
-        // The samples are the upper state's. The lower one is interpolated at the same r/a.
+        // The samples are those of the upper state. The lower state is interpolated at equal r/a.
         let ratios: Vec<f64> = (upper.radius_m.iter())
             .map(|r| r / upper.contact_radius_m)
             .collect();
@@ -591,16 +596,18 @@ impl ContactState {
     }
 }
 
-/// A row a point: the ball's modulus and radius, its guide's layers, force, contact radius and
-/// approach of its state, then distance, pressure and height. Made by `examples/contact_states.rs`.
+/// One row per point: modulus and radius of the ball, layers of the guide, force, contact radius
+/// and approach of the state, then distance, pressure and height. Written by
+/// `examples/contact_states.rs`.
 const POINTS: &str = include_str!("finite_elements.csv");
 
-/// The states of a ball on a waveguide, of growing force. None for bodies that were not computed.
+/// The states of a ball on a waveguide, in ascending order of force. `None` for bodies that were
+/// not computed.
 pub(crate) fn finite_element_states(
     sphere: &ElasticSphere,
     waveguide: &LightGuide,
 ) -> Option<Vec<ContactState>> {
-    // Compared exactly: a body that differs at all is one that was not computed.
+    // Compared exactly: a body that differs at all was not computed.
     let known = [Elastic::CL2000X, Elastic::CL2003X].contains(&sphere.material);
     let elastic = |w: &LightGuide| -> Vec<(f64, Elastic)> {
         w.layers
@@ -614,7 +621,7 @@ pub(crate) fn finite_element_states(
     }
     let mut states: Vec<ContactState> = Vec::new();
     for row in POINTS.lines().skip(1) {
-        // The layers, the third column, are the default waveguide's.
+        // The layers in the third column are those of the default waveguide.
         let cells = row
             .split(',')
             .enumerate()
@@ -633,7 +640,7 @@ pub(crate) fn finite_element_states(
         if modulus != sphere.material.youngs_modulus_pa {
             continue;
         }
-        // The rows of a state stand together: another force begins the next state.
+        // The rows of a state are contiguous: another force starts the next state.
         if states.last().is_none_or(|s| s.force_n != force_n) {
             states.push(ContactState {
                 force_n,

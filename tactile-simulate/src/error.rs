@@ -1,8 +1,8 @@
-//! What can be wrong with the description of a scene.
+//! Errors in the description of a scene.
 
 use std::fmt;
 
-/// A scene's description was rejected.
+/// The description of a scene was rejected.
 ///
 /// ```
 /// use tactile_simulate::{
@@ -36,13 +36,13 @@ use std::fmt;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimulateError {
-    /// A value lies outside the range that has a meaning (NaN always does).
+    /// A value is outside its valid range, or NaN.
     #[error(
         "{field} is {}, expected a number in {} to {}",
         Short(*found), Short(six_digits(*minimum)), Short(six_digits(*maximum))
     )]
     OutOfRange {
-        /// The field's name.
+        /// Name of the field.
         field: &'static str,
         /// Smallest value allowed.
         minimum: f64,
@@ -51,7 +51,7 @@ pub enum SimulateError {
         /// The value given.
         found: f64,
     },
-    /// Finite-element contacts of a ball or a waveguide that the crate has none of.
+    /// There are no finite-element contacts for this ball or waveguide.
     #[error(
         "finite-element contacts are there for balls of 3 mm radius of CL2000X or CL2003X on the \
          default waveguide: give others as tabulated states"
@@ -60,25 +60,25 @@ pub enum SimulateError {
     /// A list has fewer entries than needed.
     #[error("{field} has {found} entries, expected at least {expected}")]
     TooFew {
-        /// The field's name.
+        /// Name of the field.
         field: &'static str,
-        /// Entries needed.
+        /// Minimum number of entries.
         expected: usize,
-        /// Entries given.
+        /// Number of entries given.
         found: usize,
     },
-    /// A column has another length than the column it belongs to.
+    /// The length of a column differs from that of the other columns.
     #[error("{field} has {found} entries, expected {expected}")]
     LengthMismatch {
-        /// The field's name.
+        /// Name of the field.
         field: &'static str,
-        /// Entries of the other columns.
+        /// Number of entries of the other columns.
         expected: usize,
-        /// Entries given.
+        /// Number of entries given.
         found: usize,
     },
-    /// A frame of the calibration is too bright for the camera: its sum would not be in proportion
-    /// to the force.
+    /// A frame of the calibration is too bright for the camera, so its sum would not be
+    /// proportional to the force.
     #[error(
         "at {force_n} N the calibration's indenter lights pixels beyond the camera's range: take \
          a larger indenter, or a smaller force"
@@ -87,22 +87,22 @@ pub enum SimulateError {
         /// The smallest force of the calibration at which pixels saturate.
         force_n: f64,
     },
-    /// A load is too great for the law to have an equilibrium.
+    /// A load is too large for an equilibrium under the material law.
     #[error("the force {force_n} N exceeds {limit_n} N, the largest the material law can carry")]
     Overload {
-        /// The force asked for.
+        /// The requested force.
         force_n: f64,
-        /// The largest force in equilibrium.
+        /// The largest force with an equilibrium.
         limit_n: f64,
     },
 }
 
-/// A limit to six significant digits, which suffice in a message.
+/// Rounds a limit to six significant digits for a message.
 fn six_digits(limit: f64) -> f64 {
     format!("{limit:.5e}").parse().unwrap_or(limit)
 }
 
-/// A number as it is given, but not with hundreds of zeros.
+/// Formats a number without hundreds of zeros.
 struct Short(f64);
 
 impl fmt::Display for Short {
@@ -115,14 +115,14 @@ impl fmt::Display for Short {
     }
 }
 
-/// `found` if it lies in `minimum..=maximum`.
+/// Checks that `found` is in `minimum..=maximum`.
 pub(crate) fn within(
     field: &'static str,
     found: f64,
     minimum: f64,
     maximum: f64,
 ) -> Result<(), SimulateError> {
-    // Both comparisons fail for NaN.
+    // Both comparisons are false for NaN.
     if found >= minimum && found <= maximum {
         Ok(())
     } else {
@@ -135,24 +135,24 @@ pub(crate) fn within(
     }
 }
 
-/// Positive and finite.
+/// Checks that a value is positive and finite.
 pub(crate) fn positive(field: &'static str, found: f64) -> Result<(), SimulateError> {
-    // Smallest value called positive: far below any length, modulus or count in use.
+    // Smallest value that counts as positive: far below any length, modulus or count in use.
     let tiny = f64::MIN_POSITIVE;
     within(field, found, tiny, f64::MAX)
 }
 
-/// Zero or positive, and finite.
+/// Checks that a value is not negative and finite.
 pub(crate) fn not_negative(field: &'static str, found: f64) -> Result<(), SimulateError> {
     within(field, found, 0.0, f64::MAX)
 }
 
-/// Any finite number.
+/// Checks that a value is finite.
 pub(crate) fn finite(field: &'static str, found: f64) -> Result<(), SimulateError> {
     within(field, found, f64::MIN, f64::MAX)
 }
 
-/// At least `expected` entries.
+/// Checks that there are at least `expected` entries.
 pub(crate) fn at_least(
     field: &'static str,
     found: usize,

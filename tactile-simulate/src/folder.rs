@@ -1,5 +1,4 @@
-//! A scene written as the files that the command line reads: images, calibration table and scene
-//! description.
+//! Writes a scene as files for the command line: images, calibration table and scene description.
 
 use crate::calibration::CalibrationSeries;
 use crate::contact::ContactModel;
@@ -9,8 +8,8 @@ use tactile_files::io::{FileError, write_bytes, write_grey_image};
 use toml::{Table, Value};
 
 /// Writes a scene and a calibration of its sensor as files: `reference.png`, `frame_1.png` …,
-/// `calibration.csv` (columns `integrated_pixel_value,force_N`) and `scene.toml` to `folder`, which
-/// is made if need be. Returns the path of `scene.toml`.
+/// `calibration.csv` (columns `integrated_pixel_value,force_N`) and `scene.toml` in `folder`, which
+/// is created if necessary. Returns the path of `scene.toml`.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -27,7 +26,8 @@ use toml::{Table, Value};
 /// # Ok(()) }
 /// ```
 ///
-/// # Errors
+/// [`FileError::Write`] and [`FileError::Image`], with the name of the file that could not be
+/// written.
 /// [`FileError::Write`] and [`FileError::Image`], naming the file that could not be written.
 pub fn write_folder(
     scene: &PressScene,
@@ -52,7 +52,7 @@ pub fn write_folder(
     Ok(path)
 }
 
-/// The scene's description as the command line reads it.
+/// The scene description in the format of the command line.
 fn description(scene: &PressScene) -> Table {
     let options = scene.options();
     let size = Value::Array(options.camera.pixel_size_m.map(Value::Float).to_vec());
@@ -63,7 +63,7 @@ fn description(scene: &PressScene) -> Table {
             ("force_N", Value::Float(load.force_n)),
         ]))
     };
-    // The object's modulus is left out: a measurement of the folder is to find it.
+    // The modulus of the object is omitted, because a measurement of the folder should find it.
     let object = table([
         ("shape", Value::String("sphere".to_owned())),
         ("radius_m", Value::Float(options.object.radius_m)),
@@ -73,7 +73,8 @@ fn description(scene: &PressScene) -> Table {
         ),
     ]);
     let layers = Value::Array(options.waveguide.layers.iter().map(layer).collect());
-    // A closed form is read by its own law, contacts from elsewhere by the default one.
+    // Contacts by a closed form are evaluated with the same law, tabulated contacts with the
+    // default one.
     let estimator = match options.law {
         ContactModel::Hertz | ContactModel::Tatara => "sphere",
         _ => "best",

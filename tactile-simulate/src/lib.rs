@@ -1,9 +1,9 @@
 #![doc = include_str!("../README.md")]
 //!
 //! # Overview
-//! A scene goes forward only: force → contact pressure → light → photons → 8-bit frame. But for
-//! finite elements it shares no code with the measuring crates, so that a measurement of a
-//! simulated frame is a test and not a tautology.
+//! A scene is computed in one direction: force → contact pressure → light → photons → 8-bit frame.
+//! Apart from finite elements, it shares no code with the measuring crates, so that a measurement
+//! of a simulated frame is an independent test.
 //!
 //! | module | contents |
 //! |---|---|
@@ -19,20 +19,21 @@
 //! | `folder` | a scene written as files (feature `scene`) |
 //!
 //! # Conventions
-//! Images are `[row, column]`. X is the column, y the row, z points from the sensor to the object.
-//! The centre of the first pixel is (0, 0). SI units, except where a name ends in `_px` or `_grey`.
+//! Images are `[row, column]`: x is the column, y the row, and z points from the sensor to the
+//! object. The centre of the first pixel is (0, 0). Units are SI, except for names that end in
+//! `_px` or `_grey`.
 //!
 //! # Scale of the default frame
-//! The paper gives a pixel of 4.65 µm and a sensing side of 30 mm seen by 1392 pixels. Both cannot
-//! hold on the sensing surface (30 mm / 4.65 µm = 6452). They do hold together when 4.65 µm is the
-//! pitch on the camera chip and the lens reduces 30 mm to the chip's 6.47 mm (magnification 0.216).
-//! The pixel on the *surface* is then 30 mm / 1392 = 21.55 µm, which is [`Camera::default`]'s.
+//! The paper gives a pixel of 4.65 µm and a sensing side of 30 mm, imaged by 1392 pixels. Both
+//! cannot be true on the sensing surface (30 mm / 4.65 µm = 6452). They are consistent if 4.65 µm
+//! is the pitch on the camera chip and the lens reduces 30 mm to the chip's 6.47 mm (magnification
+//! 0.216). The pixel on the *surface* is then 30 mm / 1392 = 21.55 µm, as in [`Camera::default`].
 //!
 //! # Reproducibility
-//! Random numbers come from ChaCha8, a published algorithm whose stream is fixed by its definition.
-//! Those of `StdRng` and `SmallRng` may change with any release of `rand`. The ziggurat of
-//! `rand_distr` turns them into normal deviates. Each row of each frame has its own stream, so
-//! frames can be made in any order, alone or in parallel, with the same bits.
+//! Random numbers come from ChaCha8, a published algorithm with a fixed stream, whereas those of
+//! `StdRng` and `SmallRng` may change with any release of `rand`. The ziggurat of `rand_distr`
+//! converts them into normal deviates. Each row of each frame has its own stream, so that frames
+//! can be generated in any order, one by one or in parallel, with the same bits.
 #![forbid(unsafe_code)]
 
 mod calibration;

@@ -1,14 +1,13 @@
-//! Pressure to light: how much brighter a pressed pixel is.
-//!
-//! Pressure and leaked light of a contact, averaged over pixels.
+//! From pressure to light: the leaked light of a contact, averaged over pixels.
 
 use crate::contact::SimulatedContact;
 use crate::error::{SimulateError, finite, not_negative, within};
 use crate::pixel_average::{Disc, PixelPatch, PixelPlane, Profile, Window};
 
-/// Light that leaks under pressure p, relative to the gain g in grey levels per pascal. All are
-/// monotone up to the largest peak pressure p_max of the scene. Hertz's pressure under the first
-/// two is averaged over pixels exactly, everything else by quadrature (1e-4 of the light).
+/// Light that leaks under pressure p, relative to the gain g in grey levels per pascal. All
+/// responses are monotone up to the largest peak pressure p_max of the scene. For the first two,
+/// Hertz's pressure is averaged over pixels exactly, and all other cases by quadrature (1e-4 of the
+/// light).
 ///
 /// ```
 /// use tactile_simulate::{Camera, PressOptions, PressScene, Response};
@@ -22,7 +21,7 @@ use crate::pixel_average::{Disc, PixelPatch, PixelPlane, Profile, Window};
 /// };
 /// assert!((ratio(Response::Linear)? - 1.2 / 0.7).abs() < 1e-9);
 /// assert!(ratio(Response::Quadratic { droop: 0.3 })? < 1.2 / 0.7);
-/// // Hertz: a² goes as F^⅔ and pⁿ as F^(n/3).
+/// // By Hertz, a² is proportional to F^⅔ and pⁿ to F^(n/3).
 /// let power = (1.2_f64 / 0.7).powf((2.0 + 0.9) / 3.0);
 /// assert!((ratio(Response::Power { exponent: 0.9 })? / power - 1.0).abs() < 1e-3);
 /// # Ok::<(), tactile_simulate::SimulateError>(())
@@ -31,16 +30,16 @@ use crate::pixel_average::{Disc, PixelPatch, PixelPlane, Profile, Window};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Response {
-    /// g·p: the frame's sum is proportional to the force.
+    /// g·p: the sum of the frame is proportional to the force.
     #[default]
     Linear,
-    /// g·p·(1 − κ p/p_max): bends down as fewer trapped rays are left to leak. κ in 0 to 0.5.
+    /// g·p·(1 − κ p/p_max): saturates because fewer trapped rays are left to leak. κ in 0 to 0.5.
     Quadratic {
-        /// κ, the share of light lost at p_max.
+        /// κ, the fraction of light lost at p_max.
         droop: f64,
     },
-    /// g·p_max·(p/p_max)ⁿ, n in 0.25 to 4: light that is no longer in proportion to the pressure,
-    /// so that the frame's sum depends on how the force is spread.
+    /// g·p_max·(p/p_max)ⁿ, n in 0.25 to 4: the light is not proportional to the pressure, so the
+    /// sum of the frame depends on the distribution of the force.
     Power {
         /// n, 1 for [`Linear`](Self::Linear).
         exponent: f64,
@@ -73,8 +72,8 @@ impl Response {
     }
 }
 
-/// Illumination of one frame, relative to the reference frame: it scales background and leaked
-/// light alike.
+/// Illumination of one frame relative to the reference frame. It scales background and leaked light
+/// equally.
 ///
 /// ```
 /// use tactile_simulate::{Camera, Illumination, PressLoad, PressOptions, PressScene};
@@ -103,8 +102,8 @@ impl Response {
 pub struct Illumination {
     /// Brightness, 1 for unchanged.
     pub level: f64,
-    /// Relative change of brightness from the frame's first to its last column (x) and row (y). 0
-    /// for unchanged.
+    /// Relative change of brightness from the first to the last column (x) and row (y) of the
+    /// frame. 0 for unchanged.
     pub tilt: [f64; 2],
 }
 
@@ -125,20 +124,20 @@ impl Illumination {
     }
 }
 
-/// From pressure to light in one scene.
+/// The relation of light to pressure in one scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LightLaw {
     pub response: Response,
     /// Grey levels per pascal, g.
     pub grey_per_pascal: f64,
-    /// The scene's largest pressure p_max, to which the response is relative.
+    /// The largest pressure p_max of the scene, to which the response refers.
     pub largest_pressure_pa: f64,
 }
 
 impl LightLaw {
     /// Light at a pressure, in grey levels above the background.
     pub(crate) fn grey_at(&self, pressure_pa: f64) -> f64 {
-        // A scene without any load has no peak to refer to.
+        // A scene without load has no peak pressure.
         if self.largest_pressure_pa == 0.0 {
             return 0.0;
         }
@@ -146,7 +145,7 @@ impl LightLaw {
         self.grey_per_pascal * self.largest_pressure_pa * self.response.light(share)
     }
 
-    /// Unblurred light of a contact as a lens that distorts shows it.
+    /// Unblurred light of a contact through a distorting lens.
     pub(crate) fn bent_patch(
         &self,
         contact: &SimulatedContact,
@@ -178,7 +177,7 @@ impl LightLaw {
             .map_inplace(|v| *v *= self.grey_per_pascal * peak);
         let droop = self.response.droop() / self.largest_pressure_pa;
         if droop > 0.0 {
-            // The square of Hertz's pressure is p₀² (1 − ρ²), which the paraboloid averages
+            // The square of Hertz's pressure is p₀² (1 − ρ²), a paraboloid, which is averaged
             // exactly.
             let square = disc.average(Profile::Paraboloid, window);
             patch
@@ -189,7 +188,7 @@ impl LightLaw {
     }
 }
 
-/// Pressure of a contact over `window` in pascal.
+/// Pressure of a contact over `window` in pascals.
 pub(crate) fn pressure_patch(
     contact: &SimulatedContact,
     disc: &Disc,

@@ -1,4 +1,4 @@
-//! What is pressed and what it is pressed on: elastic bodies.
+//! Elastic bodies: the object and the waveguide.
 use crate::error::{SimulateError, at_least, positive, within};
 
 /// A linear elastic, isotropic material.
@@ -10,7 +10,7 @@ use crate::error::{SimulateError, at_least, positive, within};
 ///     let scene = PressScene::new(PressOptions { object, ..PressOptions::default() })?;
 ///     Ok::<_, tactile_simulate::SimulateError>(scene.truth(0).contact)
 /// };
-/// // 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂; the second of the guide's layers in series.
+/// // 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂, with the guide's layers in series as the second body.
 /// let [soft, rigid] = [contact(Elastic::CL2000X)?, contact(Elastic::RIGID)?];
 /// let of_the_ball = 1.0 / soft.effective_modulus_pa - 1.0 / rigid.effective_modulus_pa;
 /// assert!((of_the_ball / (0.75 / 103e3) - 1.0).abs() < 1e-12);
@@ -19,7 +19,7 @@ use crate::error::{SimulateError, at_least, positive, within};
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Elastic {
-    /// Young's modulus in pascal. Infinite for a rigid body.
+    /// Young's modulus in pascals. Infinite for a rigid body.
     pub youngs_modulus_pa: f64,
     /// Poisson's ratio, in (−1, 0.5].
     pub poisson_ratio: f64,
@@ -36,13 +36,13 @@ impl Elastic {
         youngs_modulus_pa: 62e3,
         poisson_ratio: 0.5,
     };
-    /// A body that does not deform.
+    /// A body without deformation.
     pub const RIGID: Self = Self {
         youngs_modulus_pa: f64::INFINITY,
         poisson_ratio: 0.3,
     };
 
-    /// (1 − ν²)/E in 1/Pa: what the body adds to 1/E*. Zero for a rigid body.
+    /// (1 − ν²)/E in 1/Pa: contribution of the body to 1/E*. Zero for a rigid body.
     pub(crate) fn plane_strain_compliance(&self) -> f64 {
         (1.0 - self.poisson_ratio) * (1.0 + self.poisson_ratio) / self.youngs_modulus_pa
     }
@@ -80,7 +80,7 @@ impl Elastic {
 pub struct ElasticSphere {
     /// Radius in metres.
     pub radius_m: f64,
-    /// What it is made of.
+    /// Material of the sphere.
     pub material: Elastic,
 }
 
@@ -118,11 +118,11 @@ pub struct WaveguideLayer {
     pub refractive_index: f64,
     /// Thickness in metres.
     pub thickness_m: f64,
-    /// What it is made of.
+    /// Material of the layer.
     pub material: Elastic,
 }
 
-/// The layered waveguide, from the object's side to the glass.
+/// The layered waveguide, from the side of the object to the glass.
 ///
 /// ```
 /// use tactile_simulate::LightGuide;
@@ -134,14 +134,14 @@ pub struct WaveguideLayer {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LightGuide {
-    /// Layers, the one touched first.
+    /// Layers, the touched one first.
     pub layers: Vec<WaveguideLayer>,
 }
 
 impl Default for LightGuide {
     /// Epidermis, dermis and subcutanea of the paper (§2.2): PDMS of 2, 3 and 5 mm with indices
-    /// 1.41, 1.40 and 1.39 and moduli 1.36×10⁵, 8.0×10⁴ and 3.4×10⁴ Pa (the paper prints 1.4×10² Pa
-    /// for the first, calling it the stiffest; its source has 1.36×10⁵).
+    /// 1.41, 1.40 and 1.39 and moduli 1.36×10⁵, 8.0×10⁴ and 3.4×10⁴ Pa. For the first layer, which
+    /// it calls the stiffest, the paper prints 1.4×10² Pa; its source has 1.36×10⁵ Pa.
     fn default() -> Self {
         let layer = |refractive_index, thickness_m, youngs_modulus_pa| WaveguideLayer {
             refractive_index,
@@ -162,7 +162,7 @@ impl Default for LightGuide {
 }
 
 impl LightGuide {
-    /// The stack seen as one material: the layers in series, E = Σh / Σ(h/E), and Poisson's ratio
+    /// The stack as one material: the layers in series, E = Σh / Σ(h/E), and Poisson's ratio
     /// averaged by thickness (0.5 for the paper's stack).
     pub(crate) fn series(&self) -> Elastic {
         let height = self.thickness_m();
@@ -178,7 +178,7 @@ impl LightGuide {
             .sum();
         Elastic {
             youngs_modulus_pa: height / compliance,
-            // The mean of equal ratios of ½ can exceed ½ by rounding.
+            // By rounding, the mean of equal ratios of ½ can exceed ½.
             poisson_ratio: (weighted / height).min(0.5),
         }
     }

@@ -1,49 +1,48 @@
-//! Averages of the contact's pressure over pixels, exact also at the rim.
+//! Averages of the contact pressure over pixels, exact also at the rim.
 //!
-//! A pixel records the mean of the light over its square, not the value at its centre. With
-//! G(x, y) = ∫₀ˣ∫₀ʸ f(s² + t²) ds dt the integral over a pixel is the inclusion–exclusion sum of G
-//! at its corners. Summed over all pixels the inner corners cancel, so the frame's sum is the
+//! A pixel records the mean of the light over its square, not the value at its centre. With G(x,
+//! y) = ∫₀ˣ∫₀ʸ f(s² + t²) ds dt, the integral over a pixel is the inclusion–exclusion sum of G at
+//! its corners. In the sum over all pixels the inner corners cancel, so the sum of the frame is the
 //! force. In units of the contact radius
 //!
 //! * f = √(1 − ρ²): 6G = 2xyz + x(3 − x²) atan(y/z) + y(3 − y²) atan(x/z) − 2 atan(xy/z), z = √(1 −
 //!   x² − y²)
 //! * f = 1 − ρ²:    G = xy(1 − (x² + y²)/3)
 //!
-//! inside. Outside the disc, G is the quarter disc's integral less the two caps beyond x and beyond
-//! y.
+//! inside. Outside the disc, G is the integral over the quarter disc minus the two caps beyond x
+//! and beyond y.
 //!
-//! Pixel averages of any function of the distance from the contact's centre, by quadrature.
-//!
-//! The image plane: pixels to places on the sensor's surface.
+//! The module also averages any function of the distance from the contact's centre by quadrature,
+//! and maps pixels to positions on the surface of the sensor.
 
 use ndarray::Array2;
 use std::f64::consts::{PI, TAU};
 
-/// Bound on the steps a side, for contacts far below a pixel, whose light is negligible.
+/// Upper limit of the steps per side, for contacts far below a pixel, whose light is negligible.
 const MOST_STEPS: f64 = 512.0;
 
-/// Least steps in the contact's radius, for contacts below a pixel.
+/// Minimum number of steps per contact radius, for contacts below a pixel.
 const STEPS_IN_RADIUS: f64 = 24.0;
 
-/// Steps a side in a pixel at the rim. Twice as many change the light of a contact of 20 pixels
+/// Steps per side in a pixel at the rim. Twice as many change the light of a contact of 20 pixels
 /// by 2e-5.
 const RIM_STEPS: f64 = 16.0;
 
-/// Pixels this close to the rim, in pixels, are averaged over a fine grid: pressures fall to zero
-/// there as a square root.
+/// Distance to the rim, in pixels, within which pixels are averaged over a fine grid: pressures
+/// fall to zero there as a square root.
 const RIM_ZONE: f64 = 3.0;
 
-/// Pixels this close to the rim, in pixels, are averaged over the fine grid.
+/// Corresponding distance behind a distorting lens.
 const BENT_RIM_ZONE: f64 = 2.0;
 
-/// Steps a side in a pixel near the rim. Twice as many change the light by some 10⁻⁴ of the rim's
-/// pixels.
+/// Steps per side in a pixel near the rim behind a distorting lens. Twice as many change the light
+/// of the rim's pixels by about 10⁻⁴.
 const BENT_RIM_STEPS: usize = 8;
 
 /// Rows and columns of the image plane: the first and one past the last of each.
 pub(crate) type Window = [[isize; 2]; 2];
 
-/// A patch of the image plane, which may reach beyond the frame.
+/// A patch of the image plane, which may extend beyond the frame.
 #[derive(Debug, Clone)]
 pub(crate) struct PixelPatch {
     /// Row and column of the first value.
@@ -61,7 +60,7 @@ impl PixelPatch {
         }
     }
 
-    /// Adds the part of the patch that lies in `frame`.
+    /// Adds the part of the patch inside `frame`.
     pub(crate) fn add_to(&self, frame: &mut Array2<f64>) {
         let [row0, col0] = self.origin;
         let (skip, first) = ((-col0).max(0) as usize, col0.max(0) as usize);
@@ -82,7 +81,7 @@ impl PixelPatch {
     }
 }
 
-/// What is averaged over the pixels, with the value 1 at the centre and 0 at the rim.
+/// The profile that is averaged over the pixels, with the value 1 at the centre and 0 at the rim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Profile {
     /// √(1 − r²/a²): the pressure.
@@ -91,7 +90,7 @@ pub(crate) enum Profile {
     Paraboloid,
 }
 
-/// Where the contact lies and how large the pixels are.
+/// Position of the contact and size of the pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Disc {
     pub centre_px: [f64; 2],
@@ -100,8 +99,8 @@ pub(crate) struct Disc {
 }
 
 impl Disc {
-    /// Rows and columns (first, one past the last) that the disc touches, widened by `margin`
-    /// pixels and cut to what lies within `margin` of a frame of `shape`.
+    /// Rows and columns (first, one past the last) touched by the disc, extended by `margin` pixels
+    /// and limited to `margin` around a frame of `shape`.
     pub(crate) fn window(&self, shape: [usize; 2], margin: usize) -> Window {
         let span = |axis: usize, length: usize| {
             let radius_px = self.radius_m / self.pixel_size_m[axis];
@@ -115,14 +114,14 @@ impl Disc {
         let [[row0, row1], [col0, col1]] = window;
         let (rows, cols) = ((row1 - row0) as usize, (col1 - col0) as usize);
         let mut values = Array2::zeros((rows, cols));
-        // In units of the radius: pixel sizes, and the pixels' first edges.
+        // Pixel sizes and first edges, in units of the radius.
         let size: [f64; 2] = std::array::from_fn(|k| self.pixel_size_m[k] / self.radius_m);
         let edge = |axis: usize, k: isize| (k as f64 - 0.5 - self.centre_px[axis]) * size[axis];
         let columns: Vec<Span> = (col0..col1)
             .map(|k| Span::new(edge(0, k), size[0]))
             .collect();
         let xs: Vec<f64> = (col0..=col1).map(|k| edge(0, k)).collect();
-        // Neighbouring pixels share a corner's value, which cancels exactly in their sum.
+        // Neighbouring pixels share the value at a corner, which cancels exactly in their sum.
         let mut corners = Corners::new(profile, &xs);
         for (r, mut line) in values.rows_mut().into_iter().enumerate() {
             let row = Span::new(edge(1, row0 + r as isize), size[1]);
@@ -134,7 +133,8 @@ impl Disc {
                 } else if column.nearest_squared + row.nearest_squared >= 1.0 {
                     0.0
                 } else {
-                    // Rounding of the corners can leave a pixel outside the disc a hair below zero.
+                    // Rounding of the corner values can leave a pixel outside the disc slightly
+                    // below zero.
                     (corners.integral(c) / (size[0] * size[1])).max(0.0)
                 };
             }
@@ -146,8 +146,8 @@ impl Disc {
     }
 }
 
-/// First and one past the last of the pixels along one axis that lie within `half` of `centre`,
-/// widened by `margin`. They are cut to those within `margin` of a frame of `length` pixels.
+/// First and one past the last of the pixels along one axis within `half` of `centre`, extended by
+/// `margin` and limited to `margin` around a frame of `length` pixels.
 pub(crate) fn touched(centre: f64, half: f64, length: usize, margin: usize) -> [isize; 2] {
     let margin = margin as isize;
     let limit = length as isize + margin;
@@ -160,9 +160,9 @@ pub(crate) fn touched(centre: f64, half: f64, length: usize, margin: usize) -> [
     [first, last]
 }
 
-/// Where the pixel is smaller than this share of 1 − ρ², quadrature of order 8 is exact to
-/// rounding: its error falls as the eighth power of that ratio. It spares the corners'
-/// cancellation, which grows as (radius/pixel)², and their cost.
+/// If the pixel is smaller than this fraction of 1 − ρ², quadrature of order 8 is exact to
+/// rounding: its error falls with the eighth power of that ratio. It avoids the cancellation at the
+/// corners, which grows as (radius/pixel)², and their cost.
 pub(crate) const SMOOTH: f64 = 0.03;
 
 /// Nodes and weights of the four-point Gauss–Legendre rule on (−½, ½).
@@ -173,14 +173,14 @@ const GAUSS: [(f64, f64); 4] = [
     (0.430_568_155_797_026_3, 0.173_927_422_568_726_93),
 ];
 
-/// A pixel's extent along one axis, in units of the radius from the contact's centre.
+/// Extent of a pixel along one axis, in units of the radius from the centre of the contact.
 #[derive(Debug, Clone, Copy)]
 struct Span {
     first: f64,
     /// Squares of the coordinates nearest to and farthest from the centre.
     nearest_squared: f64,
     farthest_squared: f64,
-    /// Squares of the coordinates of the quadrature's nodes, and their mean over the pixel.
+    /// Squares of the coordinates of the quadrature nodes, and their mean over the pixel.
     nodes_squared: [f64; 4],
     mean_squared: f64,
 }
@@ -200,12 +200,13 @@ impl Span {
             nearest_squared: nearest * nearest,
             farthest_squared: first.abs().max(last.abs()).powi(2),
             nodes_squared: GAUSS.map(|(node, _)| (middle + node * size).powi(2)),
-            // Exact: the square's mean is that of its middle plus the variance of an even spread.
+            // Exact: the mean of the square is that of the middle plus the variance of a uniform
+            // distribution.
             mean_squared: middle * middle + size * size / 12.0,
         }
     }
 
-    /// Average over the pixel of this span of x and that one of y, wholly inside the disc.
+    /// Average over the pixel of this x span and that y span, entirely inside the disc.
     fn smooth_average(&self, row: &Self, profile: Profile) -> f64 {
         if profile == Profile::Paraboloid {
             return 1.0 - self.mean_squared - row.mean_squared;
@@ -221,7 +222,7 @@ impl Span {
     }
 }
 
-/// Values of G at the corners of a row of pixels, each computed when first asked for.
+/// Values of G at the corners of a row of pixels, each computed on first use.
 struct Corners<'a> {
     profile: Profile,
     xs: &'a [f64],
@@ -242,7 +243,7 @@ impl<'a> Corners<'a> {
         }
     }
 
-    /// Moves on to the row between `above` and `below`. The corners between it and the last row are
+    /// Advances to the row between `above` and `below`. The corners shared with the last row are
     /// kept.
     fn next_row(&mut self, above: f64, below: f64) {
         self.ys = [above, below];
@@ -267,12 +268,12 @@ impl<'a> Corners<'a> {
 
 /// G(x, y), odd in x and in y.
 pub(crate) fn corner(profile: Profile, x: f64, y: f64) -> f64 {
-    // Beyond the disc's extent G no longer grows.
+    // Outside the extent of the disc, G is constant.
     let (u, v) = (x.abs().min(1.0), y.abs().min(1.0));
     let outside = u * u + v * v >= 1.0;
     let g = match (profile, outside) {
         (Profile::Hemisphere, false) => {
-            // Arctangents of quotients by z as `atan2`, since z falls to 0 at the rim.
+            // Arctangents of quotients by z use `atan2`, because z is 0 at the rim.
             let z = (1.0 - u * u - v * v).sqrt();
             let atans = u * (3.0 - u * u) * v.atan2(z) + v * (3.0 - v * v) * u.atan2(z);
             (2.0 * u * v * z + atans - 2.0 * (u * v).atan2(z)) / 6.0
@@ -295,14 +296,14 @@ fn paraboloid_cap(x: f64) -> f64 {
     (1.5 * x.acos() - x * s * (2.5 - x * x)) / 6.0
 }
 
-/// The midpoint rule of so many steps on [−½, ½]: places and weights.
+/// The midpoint rule with `steps` steps on [−½, ½]: positions and weights.
 fn midpoints(steps: usize) -> Vec<(f64, f64)> {
     let weight = 1.0 / steps as f64;
     let place = |k: usize| (k as f64 + 0.5) / steps as f64 - 0.5;
     (0..steps).map(|k| (place(k), weight)).collect()
 }
 
-/// The mean over a pixel by one rule along both of its sides.
+/// The mean over a pixel, by one rule along both of its sides.
 fn mean_over(nodes: &[(f64, f64)], value: impl Fn(f64, f64) -> f64) -> f64 {
     let mut sum = 0.0;
     for &(v, weight_y) in nodes {
@@ -317,8 +318,8 @@ impl Disc {
     /// Pixel averages over `window` of `value`, a function of the distance from the centre in
     /// metres that is zero from the rim on.
     ///
-    /// Four by four Gauss nodes inside. At the rim 16 by 16 midpoints, with an error of some 1e-5
-    /// of the light.
+    /// It uses four by four Gauss nodes inside, and 16 by 16 midpoints at the rim, with an error of
+    /// about 1e-5 of the light.
     pub(crate) fn average_radial(&self, window: Window, value: impl Fn(f64) -> f64) -> PixelPatch {
         let [[row0, row1], [col0, col1]] = window;
         let [width, height] = self.pixel_size_m;
@@ -353,13 +354,12 @@ impl Disc {
     }
 }
 
-/// Pixels of any size behind a lens that distorts about the frame's middle.
+/// Pixels of any size behind a lens that distorts about the centre of the frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PixelPlane {
     pub middle_px: [f64; 2],
     pub pixel_size_m: [f64; 2],
-    /// d = e (1 + bend e²), e the distance at which a place is seen, in metres of the frame's
-    /// middle.
+    /// d = e (1 + bend e²), with e the apparent distance from the centre of the frame in metres.
     pub bend: f64,
 }
 
@@ -368,18 +368,17 @@ impl PixelPlane {
         self.bend == 0.0
     }
 
-    /// Metres from the frame's middle that a pixel shows.
+    /// Position of a pixel in metres from the centre of the frame.
     pub(crate) fn to_metres(self, pixel: [f64; 2]) -> [f64; 2] {
         let [x, y] = std::array::from_fn(|k| (pixel[k] - self.middle_px[k]) * self.pixel_size_m[k]);
         let stretch = 1.0 + self.bend * (x * x + y * y);
         [x * stretch, y * stretch]
     }
 
-    /// The pixel that shows a place, in metres from the frame's middle.
+    /// The pixel that shows a position in metres from the centre of the frame.
     fn to_pixel(self, metres: [f64; 2]) -> [f64; 2] {
         let distance = metres[0].hypot(metres[1]);
-        // Newton's method on e (1 + bend e²) = d: the slope is positive wherever the image does not
-        // fold.
+        // Newton's method on e (1 + bend e²) = d. The slope is positive if the image does not fold.
         let mut seen = distance;
         for _ in 0..20 {
             let square = self.bend * seen * seen;
@@ -391,13 +390,13 @@ impl PixelPlane {
 }
 
 impl Disc {
-    /// Metres from the frame's middle to the contact's: `centre_px` is where it would be seen
+    /// Position of the contact in metres from the centre of the frame. `centre_px` is its pixel
     /// without distortion.
     fn place(&self, plane: PixelPlane) -> [f64; 2] {
         std::array::from_fn(|k| (self.centre_px[k] - plane.middle_px[k]) * self.pixel_size_m[k])
     }
 
-    /// [`window`](Self::window) behind a lens that distorts.
+    /// Like [`window`](Self::window), behind a distorting lens.
     pub(crate) fn bent_window(
         &self,
         plane: PixelPlane,
@@ -420,14 +419,14 @@ impl Disc {
             }
         }
         let span = |k: usize, length: usize| {
-            // A pixel more: the rim between two of its 64 points.
+            // One more pixel, because the rim may lie between two of its 64 points.
             let half = 0.5 * (high[k] - low[k]) + 1.0;
             touched(0.5 * (low[k] + high[k]), half, length, margin)
         };
         [span(1, shape[0]), span(0, shape[1])]
     }
 
-    /// [`average_radial`](Self::average_radial) behind a lens that distorts.
+    /// Like [`average_radial`](Self::average_radial), behind a distorting lens.
     pub(crate) fn average_bent(
         &self,
         plane: PixelPlane,

@@ -1,5 +1,5 @@
-//! The main scene: one sphere pressed on the layered waveguide at several loads. Its options, its
-//! frames, and what a measurement of them should find, stage by stage.
+//! The main scene: one sphere pressed on the layered waveguide at several loads, with its options,
+//! its frames, and the truth for each stage of a measurement.
 
 use crate::camera::Camera;
 use crate::contact::{ContactModel, SimulatedContact};
@@ -10,7 +10,7 @@ use crate::pixel_average::{Disc, PixelPatch};
 use nalgebra::{Matrix3, Point3};
 use ndarray::Array2;
 
-/// A checked scene that makes frames and gives their truth.
+/// A validated scene that generates frames and their truth.
 ///
 /// ```
 /// use tactile_simulate::{Camera, PressOptions, PressScene};
@@ -31,11 +31,11 @@ pub struct PressScene {
 }
 
 impl PressScene {
-    /// Checks `options` and solves the contact at every load.
+    /// Validates `options` and solves the contact at each load.
     ///
     /// # Errors
-    /// [`SimulateError::OutOfRange`] or [`SimulateError::TooFew`] naming the first field that has
-    /// no meaning.
+    /// [`SimulateError::OutOfRange`] or [`SimulateError::TooFew`] with the name of the first
+    /// invalid field.
     pub fn new(options: PressOptions) -> Result<Self, SimulateError> {
         options.validate()?;
         let contacts = (options.loads.iter())
@@ -55,8 +55,8 @@ impl PressScene {
         let response = options.response;
         let grey_per_pascal = options
             .gain
-            // Of the light at the peak, not of the pressure: a response that droops needs a higher
-            // gain.
+            // Gain for the light at the peak rather than the pressure: a response that saturates
+            // needs a higher gain.
             .grey_per_pascal(largest_pressure_pa * response.light(1.0));
         let light = LightLaw {
             response,
@@ -70,7 +70,7 @@ impl PressScene {
         })
     }
 
-    /// What the scene was made from.
+    /// The options of the scene.
     pub fn options(&self) -> &PressOptions {
         &self.options
     }
@@ -93,8 +93,8 @@ impl PressScene {
             .expose_load(light.view(), self.options.seed, load, repeat)
     }
 
-    /// Expected grey levels of load `load`, before noise and rounding. Pass it to
-    /// [`Camera::expose`](crate::Camera::expose) to draw many exposures of the same light.
+    /// Expected grey levels of load `load`, before noise and rounding. Pass them to
+    /// [`Camera::expose`](crate::Camera::expose) to generate many exposures of the same light.
     ///
     /// ```
     /// use tactile_simulate::{Camera, PressOptions, PressScene};
@@ -102,7 +102,7 @@ impl PressScene {
     /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
     /// let light = scene.expected_frame(1);
     /// let frames: Vec<_> = (0..50).map(|repeat| scene.frame(1, repeat)).collect();
-    /// let at = [32, 43]; // the middle of the contact
+    /// let at = [32, 43]; // the centre of the contact
     /// let mean = frames.iter().map(|frame| f64::from(frame[at])).sum::<f64>() / 50.0;
     /// // Photon noise of 15 000 electrons at 255 grey levels; read noise of half a level.
     /// let sd = (light[at] * 255.0 / 15e3 + 0.25).sqrt();
@@ -120,8 +120,8 @@ impl PressScene {
             .compose(leaked.as_slice(), &self.options.loads[load].illumination)
     }
 
-    /// Another object on the same sensor, with the same light, camera and centre: a calibration's
-    /// balls, for instance.
+    /// Another object on the same sensor, with the same light, camera and centre, for example the
+    /// balls of a calibration.
     ///
     /// ```
     /// use tactile_simulate::{
@@ -137,7 +137,7 @@ impl PressScene {
     /// ```
     ///
     /// # Errors
-    /// [`SimulateError`] for an object or loads without meaning.
+    /// [`SimulateError`] for an invalid object or invalid loads.
     pub fn with_object(
         &self,
         object: ElasticSphere,
@@ -151,13 +151,14 @@ impl PressScene {
             ..self.options.clone()
         })?;
         Ok(Self {
-            // A gain by peak grey level would otherwise be set anew by the other object's pressure.
+            // Otherwise a gain by peak grey level would be changed by the pressure of the other
+            // object.
             light: self.light,
             ..changed
         })
     }
 
-    /// The contact's disc on the image plane.
+    /// The disc of the contact on the image plane.
     fn disc(&self, load: usize) -> Disc {
         let options = &self.options;
         let middle = options.camera.centre_px(options.centre_px);
@@ -173,14 +174,14 @@ impl PressScene {
         }
     }
 
-    /// Blurred light of the contact in grey levels above the background. None without force.
+    /// Blurred light of the contact in grey levels above the background. `None` without force.
     fn leaked_light(&self, load: usize) -> Option<PixelPatch> {
         let (disc, camera) = (self.disc(load), &self.options.camera);
         if disc.radius_m == 0.0 {
             return None;
         }
         let (plane, contact) = (camera.plane(), &self.contacts[load]);
-        // The blur takes in light from its reach around the frame, so the window extends by it.
+        // The blur adds light from its reach around the frame, so the window is extended by it.
         let mut patch = if plane.is_flat() {
             let window = disc.window(camera.shape, camera.blur_reach());
             self.light.patch(contact, &disc, window)
@@ -193,7 +194,7 @@ impl PressScene {
     }
 }
 
-/// How many grey levels a pascal makes.
+/// Number of grey levels per pascal.
 ///
 /// ```
 /// use tactile_simulate::{Camera, Gain, PressLoad, PressOptions, PressScene};
@@ -221,16 +222,16 @@ impl PressScene {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Gain {
-    /// The largest load's peak pressure lies so many grey levels above the background (before
+    /// Grey levels above the background at the peak pressure of the largest load (before
     /// vignetting).
     PeakGrey(f64),
-    /// Fixed: grey levels per pascal. Use it to share one calibration among scenes.
+    /// A fixed number of grey levels per pascal. Use it to share one calibration among scenes.
     GreyPerPascal(f64),
 }
 
 impl Gain {
-    /// Grey levels per pascal in a scene whose brightest place shows the light of `largest_pa`. 0
-    /// where a peak is asked for and nothing is lit.
+    /// Grey levels per pascal in a scene whose brightest point has the light of `largest_pa`. 0 if
+    /// a peak is requested and nothing is lit.
     pub(crate) fn grey_per_pascal(self, largest_pa: f64) -> f64 {
         match self {
             Self::GreyPerPascal(gain) => gain,
@@ -271,9 +272,9 @@ impl Gain {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PressLoad {
-    /// Normal force in newton.
+    /// Normal force in newtons.
     pub force_n: f64,
-    /// Shear force (x, y) in newton. It moves the contact by force over
+    /// Shear force (x, y) in newtons. It displaces the contact by the force over
     /// [`PressOptions::shear_stiffness_n_per_m`].
     pub shear_n: [f64; 2],
     /// Illumination, relative to the reference frame.
@@ -281,7 +282,7 @@ pub struct PressLoad {
 }
 
 impl PressLoad {
-    /// A normal force without shear, the illumination unchanged.
+    /// A normal force without shear, with unchanged illumination.
     pub fn normal(force_n: f64) -> Self {
         Self {
             force_n,
@@ -291,7 +292,7 @@ impl PressLoad {
     }
 }
 
-/// Everything that describes a press. [`PressScene::new`](crate::PressScene::new) checks it.
+/// Description of a press, validated by [`PressScene::new`](crate::PressScene::new).
 ///
 /// ```
 /// use tactile_simulate::{Camera, Elastic, PressLoad, PressOptions, PressScene, ElasticSphere};
@@ -323,17 +324,17 @@ pub struct PressOptions {
     pub object: ElasticSphere,
     /// The waveguide.
     pub waveguide: LightGuide,
-    /// Where pressure, radius and indentation at each force come from.
+    /// Source of pressure, radius and indentation at each force.
     pub law: ContactModel,
-    /// Loads, a frame each.
+    /// Loads, one frame each.
     pub loads: Vec<PressLoad>,
-    /// Centre (x, y) of the unsheared contact in pixels. The frame's middle if not given.
+    /// Centre (x, y) of the contact without shear, in pixels. `None` for the centre of the frame.
     pub centre_px: Option<[f64; 2]>,
-    /// K_x, K_y of F_x = K_x u_x, F_y = K_y u_y in newton per metre.
+    /// K_x, K_y of F_x = K_x u_x, F_y = K_y u_y in newtons per metre.
     pub shear_stiffness_n_per_m: [f64; 2],
-    /// Camera, lens, stray light.
+    /// Camera, lens and stray light.
     pub camera: Camera,
-    /// Pressure → light.
+    /// Response of the light to pressure.
     pub response: Response,
     /// Grey levels per pascal.
     pub gain: Gain,
@@ -343,11 +344,11 @@ pub struct PressOptions {
 
 impl Default for PressOptions {
     /// The paper's experiment (§5): a CL2000X sphere of 3 mm radius at 0.7 N and 1.2 N. The
-    /// brightest pixel expected is 15 + 200 of 255 grey levels: 40 levels, twenty times its noise,
-    /// are left before saturation.
+    /// brightest pixel is expected at 15 + 200 of 255 grey levels: 40 levels, twenty times its
+    /// noise, remain before saturation.
     ///
     /// Hertz's a/R is 1.09 and 1.30 there, far outside small contact. For scenes inside Hertz's
-    /// range, take a larger sphere or smaller loads.
+    /// range, use a larger sphere or smaller loads.
     fn default() -> Self {
         Self {
             object: ElasticSphere {
@@ -375,7 +376,8 @@ impl PressOptions {
         self.response.validate()?;
         self.law.validate()?;
         at_least("loads", self.loads.len(), 1)?;
-        // A load's number takes 16 bits of its noise stream's number, 0 being the reference frame.
+        // The load number takes 16 bits of the number of its noise stream, and 0 is the reference
+        // frame.
         within("loads", self.loads.len() as f64, 1.0, 65534.0)?;
         for load in &self.loads {
             not_negative("the force in N", load.force_n)?;
@@ -390,7 +392,7 @@ impl PressOptions {
     }
 }
 
-/// The frames of a scene and their truth.
+/// The frames of a scene with their truth.
 ///
 /// ```
 /// use tactile_simulate::{Camera, PressOptions, PressScene};
@@ -415,16 +417,16 @@ pub struct PressSimulation {
     pub reference: Array2<u8>,
     /// One frame per load.
     pub frames: Vec<Array2<u8>>,
-    /// The truth of each frame.
+    /// Truth of each frame.
     pub truth: Vec<PressTruth>,
     /// Size of a pixel in metres, x and y.
     pub pixel_size_m: [f64; 2],
-    /// Young's modulus of the object in pascal: what a measurement should find.
+    /// Young's modulus of the object in pascals, which a measurement should find.
     pub youngs_modulus_pa: f64,
 }
 
 impl PressScene {
-    /// The frame without contact, and the frames and truth of every load.
+    /// The frame without contact, and the frames and truth of all loads.
     pub fn simulate(&self) -> PressSimulation {
         let loads = 0..self.options().loads.len();
         PressSimulation {
@@ -451,8 +453,8 @@ impl PressScene {
 /// let [first, second] = [&truth, &later].map(|t| t.waveguide_height_m()[middle]);
 /// assert!(second < first, "pressed deeper");
 /// assert_eq!(truth.centre_px, later.centre_px);
-/// // The light above the background, over the grey levels of a pascal, times the area of a pixel:
-/// // 0.7 N.
+/// // The light above the background, over the grey levels per pascal, times the area of a pixel,
+/// // is 0.7 N.
 /// let seen_n = truth.integrated_pixel_value / truth.grey_per_pascal * pixel_m2;
 /// assert!((seen_n / 0.7 - 1.0).abs() < 1e-9);
 /// assert!((truth.scaling_to(&later).scale - (1.2_f64 / 0.7).cbrt()).abs() < 1e-12);
@@ -461,16 +463,16 @@ impl PressScene {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PressTruth {
-    /// Force, contact radius, pressure, indentation.
+    /// Force, contact radius, pressure and indentation.
     pub contact: SimulatedContact,
-    /// The load that made it.
+    /// The load of the frame.
     pub load: PressLoad,
     /// Centre (x, y) of the contact in pixels.
     pub centre_px: [f64; 2],
-    /// Centroid (x, y) of the pressure that lies in the frame, by pixel averages: the centre to
-    /// some 1e-5 px, unless the contact is cut by the frame's edge. NaN when nothing is visible.
+    /// Centroid (x, y) of the pressure inside the frame, by pixel averages. It is the centre within
+    /// about 1e-5 px, unless the edge of the frame cuts the contact. NaN if nothing is visible.
     pub centroid_px: [f64; 2],
-    /// The force that acts inside the frame, in newton.
+    /// The force inside the frame, in newtons.
     pub visible_force_n: f64,
     /// Sum over the frame of leaked light in grey levels, without blur, lens, noise and clipping:
     /// (grey/Pa)·F/pixel area for a linear response.
@@ -508,14 +510,15 @@ impl PressScene {
         truth
     }
 
-    /// Pixels whose expected grey level exceeds 255. The frame is made only where one can.
+    /// Pixels whose expected grey level exceeds 255. The frame is computed only if there can be
+    /// any.
     fn saturated_pixels(&self, load: usize) -> usize {
         let (options, illumination) = (&self.options, self.options.loads[load].illumination);
         let peak = self.contacts[load].peak_pressure_pa;
         let brightest = options.camera.background_grey + self.light.grey_at(peak);
         let lit =
             illumination.level + 0.5 * (illumination.tilt[0].abs() + illumination.tilt[1].abs());
-        // Lens and blur only take light away from the brightest place.
+        // Lens and blur only reduce the light at the brightest point.
         if brightest * lit <= 255.0 {
             return 0;
         }
@@ -525,7 +528,7 @@ impl PressScene {
 }
 
 impl PressTruth {
-    /// Pressure in pascal, averaged over each pixel. Its sum times the pixel's area is the visible
+    /// Pressure in pascals, averaged over each pixel. Its sum times the pixel area is the visible
     /// force.
     pub fn pressure_pa(&self) -> Array2<f64> {
         let mut field = Array2::zeros(self.shape);
@@ -554,7 +557,7 @@ impl PressTruth {
         })
     }
 
-    /// How the apparent surface moves from this load to a `later` one.
+    /// Map of the apparent surface from this load to a `later` one.
     pub fn scaling_to(&self, later: &Self) -> SurfaceScaling {
         SurfaceScaling {
             from_centre_m: self.centre_m(),
@@ -564,12 +567,12 @@ impl PressTruth {
         }
     }
 
-    /// The contact's centre (x, y) in metres from the first pixel's centre.
+    /// The centre (x, y) of the contact in metres from the centre of the first pixel.
     fn centre_m(&self) -> [f64; 2] {
         std::array::from_fn(|k| self.centre_px[k] * self.pixel_size_m[k])
     }
 
-    /// A pixel's centre relative to the contact's, in metres.
+    /// Offset of a pixel's centre from that of the contact, in metres.
     fn offset_m(&self, row: usize, col: usize) -> [f64; 2] {
         let at = [col as f64, row as f64];
         std::array::from_fn(|k| (at[k] - self.centre_px[k]) * self.pixel_size_m[k])
@@ -584,13 +587,13 @@ impl PressTruth {
         }
     }
 
-    /// Force, centroid and integrated pixel value of what the frame shows.
+    /// Adds force, centroid and integrated pixel value of the visible part.
     fn add_moments(&mut self, light: &LightLaw) {
         if self.contact.contact_radius_m == 0.0 {
             return;
         }
         let disc = self.disc();
-        // No margin for the blur: the truth is the light before it.
+        // No margin for the blur, because the truth is the light before it.
         let window = disc.window(self.shape, 0);
         let pressure = pressure_patch(&self.contact, &disc, window);
         let (mut sum, mut sum_x, mut sum_y) = (0.0, 0.0, 0.0);
@@ -610,12 +613,12 @@ impl PressTruth {
     }
 }
 
-/// The map that takes the apparent surface of one load to that of another: it scales about the
-/// contact's centre.
+/// The map from the apparent surface of one load to that of another: a scaling about the centre of
+/// the contact.
 ///
-/// The surface read from a press follows Hertz's law, or nearly: a hemisphere of the contact's
-/// radius, which grows by (F₂/F₁)^⅓ whatever the object's modulus. Its strain does not depend on
-/// the modulus. At finite strain the surface grows less along z than across.
+/// The surface read from a press follows Hertz's law approximately: a hemisphere with the contact
+/// radius, which grows by (F₂/F₁)^⅓ for any modulus of the object. Its strain does not depend on
+/// the modulus. At finite strain the surface grows less along z than laterally.
 ///
 /// ```
 /// use nalgebra::Point3;
@@ -637,18 +640,19 @@ impl PressTruth {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct SurfaceScaling {
-    /// Centre (x, y) of the first contact in metres from the first pixel's centre.
+    /// Centre (x, y) of the first contact in metres from the centre of the first pixel.
     pub from_centre_m: [f64; 2],
     /// Centre (x, y) of the second contact.
     pub to_centre_m: [f64; 2],
     /// a₂/a₁, (F₂/F₁)^⅓ under Hertz's law.
     pub scale: f64,
-    /// Growth of the apparent heights, by least squares over the contact: a₂/a₁ under Hertz's law.
+    /// Growth of the apparent heights, by least squares over the contact. It is a₂/a₁ under Hertz's
+    /// law.
     pub height_scale: f64,
 }
 
 impl SurfaceScaling {
-    /// Where a point of the first surface lies on the second.
+    /// The point of the second surface that corresponds to a point of the first.
     pub fn apply(&self, point: &Point3<f64>) -> Point3<f64> {
         let [x, y] = std::array::from_fn(|k| {
             self.to_centre_m[k] + self.scale * (point[k] - self.from_centre_m[k])
@@ -664,12 +668,12 @@ impl SurfaceScaling {
     }
 }
 
-/// k of z₂(ρ) = k z₁(ρ) at equal ρ = r/a, by least squares over the discs.
+/// The factor k of z₂(ρ) = k z₁(ρ) at equal ρ = r/a, by least squares over the discs.
 fn height_scale(from: &SimulatedContact, to: &SimulatedContact) -> f64 {
     const RINGS: i32 = 32;
     let (mut product, mut square) = (0.0, 0.0);
     for ring in 0..RINGS {
-        // Rings of equal area, so that every ring has the same weight.
+        // Rings of equal area have equal weights.
         let rho = ((f64::from(ring) + 0.5) / f64::from(RINGS)).sqrt();
         let [first, second] = [from, to].map(|c| c.apparent_height_m(rho * c.contact_radius_m));
         product += first * second;

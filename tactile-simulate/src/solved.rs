@@ -1,19 +1,19 @@
-//! What finite elements found, as states that the simulator draws.
+//! Finite-element results as states for the simulator.
 
 use crate::contact::ContactState;
 use crate::error::{SimulateError, at_least, positive};
 use crate::materials::Elastic;
 use tactile_imaging::fem::{AppliedLoad, FemScene, Interface, Material, State};
 
-/// ν = ½ has no finite bulk modulus. At this one the volume of a squeezed block changes by (1 −
-/// 2ν) σ/E, which is 2e-4 of the stress over E.
+/// Poisson ratio used for ν = ½, which has no finite bulk modulus. With this value, the relative
+/// volume change of a compressed block is (1 − 2ν) σ/E, 2e-4 of the stress over E.
 const LARGEST_POISSON_RATIO: f64 = 0.4999;
 
 impl ContactState {
-    /// A state that the solver of `tactile-elasticity` found of a ball, a cone or another object
+    /// Converts a state that the finite-element solver found for a ball, a cone or another object
     /// with a free rim. `None` without contact.
     ///
-    /// The samples are the contact's nodes and its rim, at which the pressure is 0.
+    /// The samples are the nodes of the contact and its rim, where the pressure is 0.
     ///
     /// ```
     /// use tactile_imaging::fem::{AppliedLoad, Material, ObjectPress, ObjectShape};
@@ -49,15 +49,15 @@ impl ContactState {
         Some(contact)
     }
 
-    /// The face of a cylinder squeezed between two rigid plates on which its faces slide or to
-    /// which they stick, neo-Hookean and at finite strain. A state for each force, for
-    /// [`ContactModel::Tabulated`](crate::ContactModel::Tabulated). Solved anew at each call, some
-    /// 0.1 s a state: keep the states.
+    /// The face of a neo-Hookean cylinder compressed at finite strain between two rigid plates, on
+    /// which its faces slide or to which they stick. Returns one state per force, for
+    /// [`ContactModel::Tabulated`](crate::ContactModel::Tabulated). Each call solves all states
+    /// again, at about 0.1 s each, so keep the result.
     ///
-    /// Sliding, the state is homogeneous, as in a [`UniaxialScene`](crate::UniaxialScene) but for
-    /// the material law. Sticking, the face keeps its size, and the pressure is higher in the
-    /// middle of a flat cylinder and at the rim of a tall one. Blocks whose face is no disc have
-    /// the homogeneous state alone.
+    /// With sliding faces the state is homogeneous, as in a [`UniaxialScene`](crate::UniaxialScene)
+    /// apart from the material law. With sticking faces, the face keeps its size, and the pressure
+    /// is higher in the middle of a flat cylinder and at the rim of a tall one. Blocks whose face
+    /// is not a disc support only the homogeneous state.
     ///
     /// ```
     /// use tactile_imaging::fem::Interface;
@@ -86,7 +86,7 @@ impl ContactState {
     ///
     /// # Errors
     /// [`SimulateError::OutOfRange`] for sizes, moduli and forces that are not positive or forces
-    /// that do not grow, [`SimulateError::TooFew`] without a force, [`SimulateError::Overload`]
+    /// that do not increase, [`SimulateError::TooFew`] without a force, [`SimulateError::Overload`]
     /// for a force that the solver does not reach.
     pub fn of_squeezed_cylinder(
         radius_m: f64,
@@ -124,7 +124,7 @@ impl ContactState {
             return Err(unsolved(states.last().map_or(0.0, State::force_n)));
         }
         let of_state = |(state, &force_n): (&State, &f64)| Self {
-            // The solver meets it within its tolerance.
+            // The solver reaches it within its tolerance.
             force_n,
             ..Self::of_face(state, radius_m, faces)
         };
@@ -139,14 +139,14 @@ impl ContactState {
         let rim_pa = points.last().map_or(0.0, |point| point.pressure_pa);
         let rim_m = match faces {
             Interface::Bonded => undeformed_m,
-            // The pressure is even.
+            // The pressure is uniform.
             Interface::Frictionless => (force_n / (std::f64::consts::PI * middle_pa)).sqrt(),
         };
         let mut radius_m = vec![0.0];
         let mut pressure_pa = vec![middle_pa];
         for point in points {
             radius_m.push(point.r_m);
-            // A contact state has no tension: negative pressures would be refused.
+            // A contact state has no tension, and negative pressures would be rejected.
             pressure_pa.push(point.pressure_pa.max(0.0));
         }
         radius_m.push(rim_m);
@@ -154,7 +154,7 @@ impl ContactState {
         Self {
             force_n,
             contact_radius_m: rim_m,
-            // The other half is squeezed as much.
+            // The other half is compressed equally.
             indentation_m: 2.0 * state.approach_m(),
             height_m: vec![0.0; radius_m.len()],
             radius_m,

@@ -7,7 +7,7 @@ use ndarray::Array2;
 use std::f64::consts::PI;
 use tactile_imaging::pipeline::FrameSource;
 
-/// How the load runs through time: rest, then cycles of F(t) = F_max sin²(πt/T).
+/// Load as a function of time: rest, then cycles of F(t) = F_max sin²(πt/T).
 ///
 /// ```
 /// use tactile_simulate::{Camera, LoadCycle, PressOptions, PressScene};
@@ -34,13 +34,13 @@ use tactile_imaging::pipeline::FrameSource;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LoadCycle {
-    /// Largest force F_max in newton.
+    /// Largest force F_max in newtons.
     pub largest_force_n: f64,
-    /// Largest shear force (x, y) in newton. It follows the normal force.
+    /// Largest shear force (x, y) in newtons. It is proportional to the normal force.
     pub largest_shear_n: [f64; 2],
     /// Time T of one cycle in seconds.
     pub period_s: f64,
-    /// Cycles.
+    /// Number of cycles.
     pub cycles: usize,
     /// Time without contact before the first cycle, in seconds.
     pub rest_s: f64,
@@ -53,8 +53,8 @@ pub struct LoadCycle {
 }
 
 impl Default for LoadCycle {
-    /// One cycle of one second to 1.2 N after a tenth of a second of rest, at the paper's 80 frames
-    /// per second.
+    /// One cycle of one second up to 1.2 N after a tenth of a second of rest, at the paper's 80
+    /// frames per second.
     fn default() -> Self {
         Self {
             largest_force_n: 1.2,
@@ -88,15 +88,15 @@ impl Default for LoadCycle {
 /// ```
 #[derive(Debug, Clone)]
 pub struct StreamedFrame {
-    /// When it was taken, in seconds.
+    /// Time of the frame in seconds.
     pub time_s: f64,
     /// The frame.
     pub frame: Array2<u8>,
-    /// Its truth.
+    /// Truth of the frame.
     pub truth: PressTruth,
 }
 
-/// Iterator over the frames of a [`LoadCycle`], made one by one.
+/// Iterator over the frames of a [`LoadCycle`], generated one by one.
 ///
 /// ```
 /// use tactile_simulate::{Camera, LoadCycle, PressOptions, PressScene};
@@ -117,8 +117,8 @@ pub struct FrameStream {
 }
 
 impl PressScene {
-    /// The frames of `cycle` with this scene's object, sensor, light and gain (its own loads set
-    /// the gain only).
+    /// The frames of `cycle` with the object, sensor, light and gain of this scene (its own loads
+    /// only determine the gain).
     ///
     /// ```
     /// use tactile_simulate::{Camera, LoadCycle, PressOptions, PressScene};
@@ -133,7 +133,7 @@ impl PressScene {
     /// ```
     ///
     /// # Errors
-    /// [`SimulateError::OutOfRange`] for a cycle without meaning.
+    /// [`SimulateError::OutOfRange`] for an invalid cycle.
     pub fn stream(&self, cycle: LoadCycle) -> Result<FrameStream, SimulateError> {
         let options = self.options();
         within(
@@ -166,8 +166,8 @@ impl FrameStream {
     fn load_at(&self, time_s: f64) -> PressLoad {
         let c = &self.cycle;
         let phase = ((time_s - c.rest_s) / c.period_s).max(0.0);
-        // The rate of loading is 0 at the start and the end of a cycle, so that cycles join without
-        // a kink.
+        // The rate of loading is 0 at the start and the end of a cycle, so that cycles join
+        // smoothly.
         let share = (PI * phase).sin().powi(2);
         let level = (1.0 + c.light_drift_per_s * time_s).max(0.0);
         let tilt = c.light_tilt_per_s.map(|rate| rate * time_s);
@@ -195,7 +195,7 @@ impl Iterator for FrameStream {
         let scene = scene.ok()?;
         let light = scene.expected_frame(0);
         let camera = scene.options().camera;
-        // Above the frames a scene makes itself, whose numbers stay below 2⁴⁷.
+        // Above the frame numbers of a scene itself, which are below 2⁴⁷.
         let frame = camera.expose(light.view(), scene.options().seed, 1 << 47 | k as u64);
         Some(StreamedFrame {
             time_s,

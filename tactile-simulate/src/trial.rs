@@ -1,4 +1,4 @@
-//! A simulated press, measured blindly and laid beside its truth.
+//! A simulated press, measured blindly and compared with its truth.
 
 use crate::{
     CalibrationRun, Camera, ContactModel, PressOptions, PressScene, PressSimulation, SimulateError,
@@ -9,8 +9,8 @@ use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::{EstimatorChoice, PipelineError, StagesConfig};
 use tactile_imaging::{Object, Pipeline, Press};
 
-/// A simulated press with the calibration of its sensor: the frames to measure and the truth to
-/// compare with.
+/// A simulated press with the calibration of its sensor: the frames to be measured and the truth
+/// for comparison.
 ///
 /// ```
 /// use tactile_simulate::Trial;
@@ -24,19 +24,20 @@ use tactile_imaging::{Object, Pipeline, Press};
 pub struct Trial {
     /// The scene.
     pub scene: PressScene,
-    /// Its frames and their truth.
+    /// The frames with their truth.
     pub simulation: PressSimulation,
-    /// What the calibration of this sensor with a gauge gave.
+    /// Calibration pairs of this sensor with a gauge.
     pub pairs: Vec<CalibrationPair>,
 }
 
 impl Trial {
-    /// Simulates a calibration series and the press itself. Where the calibration's ball saturates
-    /// the camera, one of two, four, eight or sixteen times its radius takes its place. A gain that
-    /// suits the low pressure of a large or soft object is too high for a small rigid ball.
+    /// Simulates a calibration series and the press itself. If the ball of the calibration
+    /// saturates the camera, it is replaced by one of two, four, eight or sixteen times its radius.
+    /// A gain that suits the low pressure of a large or soft object is too high for a small rigid
+    /// ball.
     ///
     /// # Errors
-    /// [`SimulateError`] for options that have no meaning.
+    /// [`SimulateError`] for invalid options.
     pub fn new(options: PressOptions, calibration: &CalibrationRun) -> Result<Self, SimulateError> {
         let scene = PressScene::new(options)?;
         let calibration = scene.unsaturated(*calibration)?;
@@ -49,8 +50,8 @@ impl Trial {
         })
     }
 
-    /// The default press on a camera of every `factor`-th pixel: quick, for examples and tests. The
-    /// paper's camera on 30 mm has 174 × 130 pixels at a factor of 8.
+    /// The default press with a camera that has every `factor`-th pixel, which is fast enough for
+    /// examples and tests. With a factor of 8, the paper's camera has 174 × 130 pixels on 30 mm.
     ///
     /// # Errors
     /// [`SimulateError`] for a factor that leaves no pixels.
@@ -62,11 +63,10 @@ impl Trial {
         Self::new(options, &CalibrationRun::default())
     }
 
-    /// The default pipeline for the simulated sensor: it is given the calibration, the pixel size,
-    /// the ball's radius and the waveguide, all exactly, and nothing of the truth. Where the scene
-    /// obeys a closed form (Hertz, Tatara), the estimator is Hertz's with the layers in series
-    /// ([`EstimatorChoice::Sphere`]), whose law the truth shares. Where its contacts come from
-    /// elsewhere, the default.
+    /// The default pipeline for the simulated sensor. It gets the exact calibration, pixel size,
+    /// ball radius and waveguide, but no truth. If the scene follows a closed form (Hertz, Tatara),
+    /// the estimator is Hertz's with the layers in series ([`EstimatorChoice::Sphere`]), the same
+    /// law as the truth. For tabulated contacts it is the default estimator.
     ///
     /// # Errors
     /// [`PipelineError`].
@@ -100,7 +100,7 @@ impl Trial {
             .with_stages(&config)
     }
 
-    /// The frames on a pipeline.
+    /// The frames as a press on a pipeline.
     ///
     /// # Errors
     /// [`PipelineError`].

@@ -1,4 +1,4 @@
-//! A plain or patterned block or cylinder squeezed between two plates without friction: the case
+//! A plain or patterned block or cylinder compressed between two plates without friction: the case
 //! for which the paper's ratio (31), E = S_zz / mean e_zz, is exact.
 //!
 //! The deformation is homogeneous, x = λ_t X, y = λ_t Y, z = λ_z Z, and the material obeys S = E·e
@@ -9,17 +9,18 @@
 //! * S_zz = E e_zz; force F = −λ_z S_zz A₀; Cauchy's stress σ = λ_z S_zz/λ_t².
 //!
 //! From state 1 to state 2, with state 1 as the reference, e₁₂ = (e₂ − e₁)/λ₁² and S₁₂ = (S₂ −
-//! S₁)/λ₁² have the ratio E again.
+//! S₁)/λ₁², whose ratio is again E.
 //!
-//! In small strain all the stresses agree. At 10 % they differ by as much. The force has a greatest
-//! value, E A₀/(3√3) at λ_z = 1/√3, where this material law ends.
+//! At small strain all stresses agree. At 10 % they differ by the same amount. The force has a
+//! maximum, E A₀/(3√3) at λ_z = 1/√3, where this material law ends.
 //!
-//! The frame shows pressure in proportion to the pattern's height, normalised to carry the force.
+//! The frame shows a pressure proportional to the height of the pattern, normalised to carry the
+//! force.
 //!
 //! On a rectangular face the height is h(X, Y) = h₀ + h₁ Σₖ b((X − Xₖ)/w) b((Y − Yₖ)/w) with b(t) =
-//! cos²(πt/2) for |t| < 1, 0 beyond. It is continuous with its slope, and each bump lies wholly on
-//! the face. The integral ∫b = (t + sin(πt)/π)/2 in closed form makes every pixel's average a
-//! product of two differences.
+//! cos²(πt/2) for |t| < 1, and 0 outside. It has a continuous slope, and each bump lies entirely on
+//! the face. The integral ∫b = (t + sin(πt)/π)/2 has a closed form, so the average over a pixel is
+//! a product of two differences.
 
 use crate::camera::{Camera, Purpose, row_stream};
 use crate::error::{SimulateError, at_least, finite, not_negative, positive, within};
@@ -31,7 +32,7 @@ use ndarray::Array2;
 use rand_distr::{Distribution, Uniform};
 use std::f64::consts::PI;
 
-/// A checked scene of uniaxial compression.
+/// A validated scene of uniaxial compression.
 ///
 /// ```
 /// use tactile_simulate::{Camera, UniaxialOptions, UniaxialScene};
@@ -39,7 +40,7 @@ use std::f64::consts::PI;
 /// let camera = Camera::default().coarser(4);
 /// let scene = UniaxialScene::new(UniaxialOptions { camera, ..UniaxialOptions::default() })?;
 /// let [first, second] = [scene.states()[0], scene.states()[1]];
-/// // Counted from the first state, both are less by it, over λ₁².
+/// // Relative to the first state, both are reduced by its value and divided by λ₁².
 /// let (stress, strain) = (
 ///     second.second_piola_zz_pa - first.second_piola_zz_pa,
 ///     second.strain_zz - first.strain_zz,
@@ -58,11 +59,11 @@ pub struct UniaxialScene {
 }
 
 impl UniaxialScene {
-    /// Checks `options`, solves every state and places the pattern.
+    /// Validates `options`, solves each state and places the pattern.
     ///
     /// # Errors
     /// [`SimulateError::OutOfRange`], [`SimulateError::TooFew`], or [`SimulateError::Overload`] for
-    /// a force beyond E A₀/(3√3).
+    /// a force above E A₀/(3√3).
     pub fn new(options: UniaxialOptions) -> Result<Self, SimulateError> {
         options.validate()?;
         let area0 = options.outline.area_m2(options.face_m);
@@ -89,7 +90,7 @@ impl UniaxialScene {
         Ok(scene)
     }
 
-    /// What the scene was made from.
+    /// The options of the scene.
     pub fn options(&self) -> &UniaxialOptions {
         &self.options
     }
@@ -99,7 +100,7 @@ impl UniaxialScene {
         self.grey_per_pascal
     }
 
-    /// Stretch, strain and stress of every force.
+    /// Stretch, strain and stress at each force.
     pub fn states(&self) -> &[UniaxialState] {
         &self.states
     }
@@ -150,7 +151,7 @@ impl UniaxialScene {
             .compose(&[patch], &Illumination::default())
     }
 
-    /// Pressure in pascal averaged over each pixel. The sum times the pixel's area is the force.
+    /// Pressure in pascals averaged over each pixel. The sum times the pixel area is the force.
     ///
     /// # Panics
     /// If there is no such state.
@@ -164,11 +165,11 @@ impl UniaxialScene {
         self.options.camera.centre_px(self.options.centre_px)
     }
 
-    /// Pixel averages of the pressure over the face and the blur's reach.
+    /// Pixel averages of the pressure over the face and the reach of the blur.
     fn pressure(&self, load: usize) -> PixelPatch {
         let (s, camera, relief) = (&self.states[load], &self.options.camera, &self.relief);
         let centre = self.centre_px();
-        // A pixel's size in material coordinates: the face spreads while the pixel keeps its size.
+        // Size of a pixel in material coordinates: the face spreads while the pixel keeps its size.
         let pixel: [f64; 2] = std::array::from_fn(|k| camera.pixel_size_m[k] / s.stretch_lateral);
         // First pixel and pixel edges in material coordinates, along x and y.
         let span = |k: usize, length: usize| {
@@ -202,7 +203,8 @@ impl UniaxialScene {
             let profile = |k: usize| means(k, &|x| relief.bump_integral(bump, k, x));
             add_product(&mut values, bump.height_m, &profile(1), &profile(0));
         }
-        // The deformed face is larger by λ_t². The pixels' pressures then add up to the force.
+        // The deformed face is larger by λ_t². The pressures of the pixels then add up to the
+        // force.
         let scale = s.force_n / (relief.volume_m3() * s.stretch_lateral * s.stretch_lateral);
         values.map_inplace(|v| *v *= scale);
         PixelPatch {
@@ -212,9 +214,9 @@ impl UniaxialScene {
     }
 }
 
-/// values += height · column ⊗ line, where both differ from zero.
+/// values += height · column ⊗ line, restricted to non-zero entries.
 fn add_product(values: &mut Array2<f64>, height: f64, column: &[f64], line: &[f64]) {
-    // A bump covers few of the pixels. The rest of the products are zero.
+    // A bump covers few pixels; the remaining products are zero.
     let first = line.iter().position(|&v| v != 0.0).unwrap_or(line.len());
     let last = line
         .iter()
@@ -231,8 +233,8 @@ fn add_product(values: &mut Array2<f64>, height: f64, column: &[f64], line: &[f6
     }
 }
 
-/// Everything that describes the squeezed block. [`UniaxialScene::new`](crate::UniaxialScene::new)
-/// checks it.
+/// Description of the compressed block, validated by
+/// [`UniaxialScene::new`](crate::UniaxialScene::new).
 ///
 /// ```
 /// use tactile_simulate::{Camera, Elastic, UniaxialOptions, UniaxialScene};
@@ -250,20 +252,20 @@ fn add_product(values: &mut Array2<f64>, height: f64, column: &[f64], line: &[f6
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct UniaxialOptions {
-    /// What the block is made of.
+    /// Material of the block.
     pub material: Elastic,
     /// Outline of the face.
     #[cfg_attr(feature = "serde", serde(default))]
     pub outline: FaceOutline,
     /// Sides of the undeformed face (x, y), or axes of its ellipse, in metres.
     pub face_m: [f64; 2],
-    /// What its surface looks like.
+    /// Pattern of its surface.
     pub pattern: SurfacePattern,
-    /// Forces in newton, a frame each. 0 shows no light.
+    /// Forces in newtons, one frame each. 0 gives no light.
     pub forces_n: Vec<f64>,
-    /// Centre (x, y) of the face in pixels. The frame's middle if not given.
+    /// Centre (x, y) of the face in pixels. `None` for the centre of the frame.
     pub centre_px: Option<[f64; 2]>,
-    /// Camera, lens, stray light.
+    /// Camera, lens and stray light.
     pub camera: Camera,
     /// Grey levels per pascal.
     pub gain: Gain,
@@ -321,7 +323,7 @@ impl UniaxialOptions {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct UniaxialState {
-    /// Compressive force in newton.
+    /// Compressive force in newtons.
     pub force_n: f64,
     /// λ_z.
     pub stretch_z: f64,
@@ -329,9 +331,9 @@ pub struct UniaxialState {
     pub stretch_lateral: f64,
     /// Green–Lagrange strain e_zz.
     pub strain_zz: f64,
-    /// Second Piola–Kirchhoff stress S_zz in pascal.
+    /// Second Piola–Kirchhoff stress S_zz in pascals.
     pub second_piola_zz_pa: f64,
-    /// Cauchy stress in pascal: the negative of force over the deformed face.
+    /// Cauchy stress in pascals: the negative force over the deformed face.
     pub cauchy_zz_pa: f64,
     /// Deformed face in square metres.
     pub area_m2: f64,
@@ -340,7 +342,7 @@ pub struct UniaxialState {
 impl UniaxialState {
     fn new(material: &Elastic, area0_m2: f64, force_n: f64) -> Result<Self, SimulateError> {
         let e = material.youngs_modulus_pa;
-        // Nominal stress over modulus: λ(1 − λ²)/2, greatest at 1/√3.
+        // Nominal stress over modulus: λ(1 − λ²)/2, largest at 1/√3.
         let load = force_n / (e * area0_m2);
         let limit = 1.0 / 27.0_f64.sqrt();
         if load >= limit {
@@ -349,7 +351,7 @@ impl UniaxialState {
                 limit_n: limit * e * area0_m2,
             });
         }
-        // λ³ − λ + 2·load = 0: the largest of three real roots by the cosine formula.
+        // λ³ − λ + 2·load = 0: the largest of three real roots, by the cosine formula.
         let stretch = 2.0 / 3.0_f64.sqrt() * ((-load / limit).acos() / 3.0).cos();
         // As a product, because λ² − 1 loses digits at small strain.
         let strain_zz = 0.5 * (stretch - 1.0) * (stretch + 1.0);
@@ -367,7 +369,7 @@ impl UniaxialState {
     }
 }
 
-/// The outline of a squeezed face.
+/// Outline of a compressed face.
 ///
 /// ```
 /// use tactile_simulate::{Camera, FaceOutline, UniaxialOptions, UniaxialScene};
@@ -387,15 +389,15 @@ impl UniaxialState {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum FaceOutline {
-    /// A rectangle of the face's sides: a block.
+    /// A rectangle with the sides of the face, for a block.
     #[default]
     Rectangle,
-    /// The ellipse in it: a cylinder. Bumps that do not lie wholly on it are left out.
+    /// The inscribed ellipse, for a cylinder. Bumps that are not entirely on it are omitted.
     Ellipse,
 }
 
 impl FaceOutline {
-    /// Area of a face of these sides.
+    /// Area of a face with these sides.
     fn area_m2(self, size_m: [f64; 2]) -> f64 {
         let rectangle = size_m[0] * size_m[1];
         match self {
@@ -404,7 +406,7 @@ impl FaceOutline {
         }
     }
 
-    /// Whether the box around a point lies on a face of these sides.
+    /// Whether the box around a point lies on a face with these sides.
     fn holds(self, at: [f64; 2], half_width_m: f64, size_m: [f64; 2]) -> bool {
         let reach: [f64; 2] =
             std::array::from_fn(|k| (at[k].abs() + half_width_m) / (0.5 * size_m[k]));
@@ -430,7 +432,7 @@ impl FaceOutline {
 ///     pattern,
 ///     ..UniaxialOptions::default()
 /// })?;
-/// // The pressure goes with the height: bumps press harder than the face in the mean.
+/// // The pressure is proportional to the height: bumps press harder than the average of the face.
 /// let highest = scene.pressure_pa(0).into_iter().fold(0.0, f64::max);
 /// assert!(highest > -1.2 * scene.states()[0].cauchy_zz_pa);
 /// # Ok::<(), tactile_simulate::SimulateError>(())
@@ -440,11 +442,11 @@ impl FaceOutline {
 pub struct SurfacePattern {
     /// Height of the plain face in metres.
     pub base_height_m: f64,
-    /// Height of the bumps above it, the smallest and the largest, in metres.
+    /// Smallest and largest height of the bumps above it, in metres.
     pub bump_height_m: [f64; 2],
-    /// Columns and rows of bumps, one in each cell of a grid, at a random place in its cell.
+    /// Columns and rows of bumps: one in each cell of a grid, at a random position in its cell.
     pub bumps: [usize; 2],
-    /// Half width w of a bump as a share of the cell's shorter side, up to ½.
+    /// Half width w of a bump as a fraction of the shorter side of the cell, up to ½.
     pub bump_share: f64,
 }
 
@@ -480,7 +482,7 @@ impl SurfacePattern {
         within("bump_share", self.bump_share, 1e-6, 0.5)
     }
 
-    /// Places the bumps on a face of `size_m` centred on the origin.
+    /// Places the bumps on a face of `size_m` centred at the origin.
     fn place(&self, outline: FaceOutline, size_m: [f64; 2], seed: u64) -> Relief {
         let mut rng = row_stream(seed, Purpose::Pattern, 0, 0);
         let cell: [f64; 2] = std::array::from_fn(|k| size_m[k] / self.bumps[k] as f64);
@@ -503,7 +505,8 @@ impl SurfacePattern {
                 });
             }
         }
-        // Left out after all numbers are drawn: the outline does not move the bumps that stay.
+        // Removed after all random numbers are drawn, so that the outline does not move the
+        // remaining bumps.
         bumps.retain(|bump: &Bump| outline.holds(bump.centre_m, half_width_m, size_m));
         Relief {
             outline,
@@ -522,7 +525,7 @@ pub(crate) struct Bump {
     pub height_m: f64,
 }
 
-/// A pattern in its place: heights over the material coordinates (X, Y) of the undeformed face.
+/// A placed pattern: heights over the material coordinates (X, Y) of the undeformed face.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Relief {
     outline: FaceOutline,
@@ -540,9 +543,9 @@ impl Relief {
             + bumps * self.half_width_m * self.half_width_m
     }
 
-    /// Shares of the cells between `rows` (y) and `columns` (x), edges in material coordinates,
-    /// that an elliptic face covers. They are differences of the area of the unit disc to the lower
-    /// left of the cells' corners.
+    /// Fractions of the cells between `rows` (y) and `columns` (x), edges in material coordinates,
+    /// that are covered by an elliptic face. They are differences of the area of the unit disc to
+    /// the lower left of the cells' corners.
     fn covered_by_ellipse(&self, rows: &[f64], columns: &[f64]) -> Array2<f64> {
         let half = self.size_m.map(|side| 0.5 * side);
         let corner = |row: usize, column: usize| {
@@ -553,7 +556,7 @@ impl Relief {
             let covered = corners[[r + 1, c + 1]] - corners[[r + 1, c]] - corners[[r, c + 1]]
                 + corners[[r, c]];
             let cell = (rows[r + 1] - rows[r]) * (columns[c + 1] - columns[c]);
-            // Differences of areas near 1 leave rounding below 0 and above 1.
+            // Differences of areas near 1 can be slightly below 0 or above 1 by rounding.
             (covered / cell).clamp(0.0, 1.0)
         })
     }
@@ -571,19 +574,19 @@ impl Relief {
     }
 }
 
-/// Area of the unit disc where X ≤ x and Y ≤ y: ∫ (min(y, h) + h) dt over t from −1 to x with h =
+/// Area of the unit disc with X ≤ x and Y ≤ y: ∫ (min(y, h) + h) dt over t from −1 to x with h =
 /// √(1 − t²), where y ≥ −h.
 pub(crate) fn disc_below(x: f64, y: f64) -> f64 {
     let (x, y) = (x.clamp(-1.0, 1.0), y.clamp(-1.0, 1.0));
     // ∫ h from 0 to t.
     let half_disc = |t: f64| 0.5 * (t * (1.0 - t * t).max(0.0).sqrt() + t.asin());
-    // Between −c and c the line Y = y lies inside the disc.
+    // Between −c and c the line Y = y is inside the disc.
     let c = (1.0 - y * y).max(0.0).sqrt();
     let inside = |to: f64| to.clamp(-c, c) + c;
     let whole = half_disc(x) - half_disc(-1.0);
     let chord = half_disc(x.clamp(-c, c)) - half_disc(-c);
-    // Where the line lies inside, y + h. Beside the chord, 2 h for a line above the disc's middle
-    // and nothing for one below it.
+    // The integrand is y + h where the line is inside. Beside the chord it is 2 h for a line above
+    // the middle of the disc, and zero for one below it.
     let beside = whole - chord;
     y * inside(x) + chord + if y >= 0.0 { 2.0 * beside } else { 0.0 }
 }

@@ -1,4 +1,4 @@
-//! What the tests of several crates share: recorded answers, tables of worst errors, published
+//! Tools shared by the tests of several crates: recorded answers, tables of worst errors, published
 //! data.
 #![forbid(unsafe_code)]
 #![allow(missing_docs, clippy::print_stdout)]
@@ -11,7 +11,7 @@ pub use published::{published, reference};
 pub use recorded::Answers;
 pub use worst::{Worst, cases, numbers, rows};
 
-/// How many draws a study takes: the number in the environment's variable, or what a test takes.
+/// Number of draws in a study: from the environment variable, or the default of the test.
 pub fn draws(variable: &str, otherwise: u64) -> u64 {
     let given = std::env::var(variable).ok();
     given.and_then(|n| n.parse().ok()).unwrap_or(otherwise)

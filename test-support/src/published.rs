@@ -3,7 +3,7 @@
 use serde_json::Value;
 use std::path::PathBuf;
 
-/// A file or folder of the data.
+/// A file or folder of the published data. `None` if it is absent.
 pub fn published(name: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("TACTILE_DATA").map(PathBuf::from);
     let path = folder.map(|folder| folder.join(name));
@@ -14,7 +14,7 @@ pub fn published(name: &str) -> Option<PathBuf> {
     found
 }
 
-/// A file of reference numbers of many digits, after a check that the parser rounds correctly.
+/// A file of high-precision reference numbers, after a check that the parser rounds correctly.
 pub fn reference(name: &str) -> Option<Value> {
     let text = std::fs::read_to_string(published(&format!("reference/{name}"))?).expect("readable");
     let file: Value = serde_json::from_str(&text).expect("the reference is JSON");

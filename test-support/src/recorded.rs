@@ -1,16 +1,16 @@
-//! Answers of the tests' scenes, compared with those of an earlier state: one format for all
-//! crates.
+//! Recorded answers of the tests' scenes, compared with those of an earlier state, in one format
+//! for all crates.
 //!
-//! A record is a text file of lines `name: number number …`. A change that is meant to leave every
-//! answer as it is shows that here. One that is meant to move answers writes the records anew with
-//! `RECORD_ANSWERS=1 cargo test -p CRATE --test suite recorded`: the difference of the file says
-//! what moved, the commit says why.
+//! A record is a text file of lines `name: number number …`. It confirms a change that should not
+//! affect any answer. After a change that should, write the records again with
+//! `RECORD_ANSWERS=1 cargo test -p CRATE --test suite recorded`; the difference of the file shows
+//! the effect, and the commit explains it.
 use std::fmt::Write as _;
 
-/// What a crate's scenes answer, in the order in which it was found.
+/// Answers of a crate's scenes, in the order of computation.
 #[derive(Default)]
 pub struct Answers {
-    /// What the numbers are, then the numbers.
+    /// Name of each line, with its numbers.
     lines: Vec<(String, Vec<f64>)>,
 }
 
@@ -33,8 +33,8 @@ impl Answers {
         text
     }
 
-    /// What differs from the text of a record by more than `tolerance(name, number, largest number
-    /// of the line)` allows.
+    /// Differences from a recorded text that exceed
+    /// `tolerance(name, number, largest number of the line)`.
     pub fn differences(
         &self,
         record: &str,
@@ -70,7 +70,7 @@ impl Answers {
         differences
     }
 
-    /// Compares with the record at `path`, or writes it where the environment asks for that.
+    /// Compares with the record at `path`, or writes it if the environment requests it.
     pub fn check(&self, path: &str, tolerance: impl Fn(&str, f64, f64) -> f64) {
         if std::env::var_os("RECORD_ANSWERS").is_some() {
             std::fs::write(path, self.text()).expect("the record can be written");

@@ -1,4 +1,4 @@
-//! Worst error over rounding times condition, one row a check.
+//! Worst error relative to rounding times condition number, one row per check.
 
 /// The rows of one crate.
 pub struct Worst {
@@ -14,7 +14,7 @@ impl Worst {
         }
     }
 
-    /// Enters an error in units of ε·cond; `bound` is what the check allows. NaN stays.
+    /// Enters an error in units of ε·cond. `bound` is the limit of the check. NaN is kept.
     pub fn enter(&mut self, check: &str, units: f64, bound: f64) {
         match self.rows.iter_mut().find(|row| row.0 == check) {
             Some(row) if row.1.is_nan() || units <= row.1 => {}
@@ -23,7 +23,7 @@ impl Worst {
         }
     }
 
-    /// Prints the table and fails where a row is above its bound or NaN.
+    /// Prints the table, and fails if a row is above its bound or NaN.
     pub fn finish(self) {
         println!(
             "{}: worst error / (epsilon * condition)\n  {:<48} {:>10} {:>10}",

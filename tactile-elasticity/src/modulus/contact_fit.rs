@@ -45,7 +45,7 @@ pub(super) struct ContactFit<'a, L: ?Sized> {
     /// zero, with their errors.
     log_compliance: Uncertain,
     log_size: Uncertain,
-    /// ln of 1 − ν² over the one stated: zero, with its error.
+    /// ln of 1 − ν² relative to the stated value: zero, with its error.
     log_lateral: Uncertain,
     /// Whether the law depends on the other body's part of 1/E*.
     feels_share: bool,

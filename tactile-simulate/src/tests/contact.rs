@@ -1,4 +1,4 @@
-//! Contacts by closed forms, as tables and by finite elements.
+//! Contacts by closed forms, by tables and by finite elements.
 
 use crate::contact::SimulatedContact;
 use crate::contact::{ContactModel, ContactState, finite_element_states};
@@ -30,7 +30,7 @@ fn hertz_relations_hold_among_themselves() {
         4.0 / 3.0 * e * 3e-3_f64.sqrt() * c.indentation_m.powf(1.5),
     );
     close(c.peak_pressure_pa, 2.0 * a * e / (PI * 3e-3));
-    // Both surfaces' displacement at the centre is the approach.
+    // The displacement of both surfaces at the centre is the approach.
     close(
         -c.waveguide_height_m(0.0),
         c.waveguide_share * c.indentation_m,
@@ -45,10 +45,11 @@ fn displacement_is_continuous_at_the_rim_and_where_the_series_takes_over() {
         (50.0 * c.contact_radius_m, 1e-9),
     ] {
         let at = |q: f64| c.waveguide_height_m(q);
-        // One-sided values differ by slope × step plus the closed form's cancellation, (r/a)³ ulps.
+        // One-sided values differ by slope × step plus the cancellation of the closed form, (r/a)³
+        // ulps.
         assert!((at(r * (1.0 - step)) / at(r * (1.0 + step)) - 1.0).abs() < 1e-8);
     }
-    // Far away: a point force on a half space, F/(π E* r) for both bodies.
+    // Far away the contact acts as a point force on a half space: F/(π E* r) for both bodies.
     let r = 1e3 * c.contact_radius_m;
     let point = c.waveguide_share * c.force_n / (PI * c.effective_modulus_pa * r);
     assert!((-c.waveguide_height_m(r) / point - 1.0).abs() < 1e-6);
@@ -59,7 +60,8 @@ fn tatara_keeps_the_radius_and_lessens_the_approach() {
     let [h, t] = [ContactModel::Hertz, ContactModel::Tatara].map(|law| contact(law, 0.7));
     assert_eq!(h.contact_radius_m, t.contact_radius_m);
     assert!(t.indentation_m < h.indentation_m && t.indentation_m > 0.0);
-    // At small load the correction vanishes relative to Hertz's approach, as F against F^(2/3).
+    // At small load the correction vanishes relative to Hertz's approach, like F relative to
+    // F^(2/3).
     let ratio = |f| {
         contact(ContactModel::Tatara, f).indentation_m
             / contact(ContactModel::Hertz, f).indentation_m
@@ -102,8 +104,8 @@ fn states_between_and_below_hertz_are_hertz() {
         assert!(close(found.carried_force_n(), force_n));
         let r = 0.4 * expected.contact_radius_m;
         assert!(close(found.pressure_at_pa(r), expected.pressure_pa(r)));
-        // Heights are linear between the samples: a chord of a/200 is off by some 1e-5 of the
-        // height.
+        // Heights are linear between the samples: a chord of a/200 has a relative error of about
+        // 1e-5.
         let height = found.height_at_m(r) / expected.waveguide_height_m(r);
         assert!((height - 1.0).abs() < 1e-4, "{force_n} {height}");
     }
@@ -159,8 +161,8 @@ fn every_state_is_a_contact_that_carries_its_force() {
         }
         for state in &states {
             state.validate().unwrap();
-            // The recovered nodal pressures carry the force within the contact radius's own
-            // uncertainty.
+            // The recovered nodal pressures carry the force within the uncertainty of the contact
+            // radius.
             let carried = state.carried_force_n() / state.force_n;
             assert!(
                 (carried - 1.0).abs() < 5e-3,

@@ -1,4 +1,4 @@
-//! The parts of the simulator against closed forms and brute force.
+//! Compares parts of the simulator with closed forms and brute force.
 
 use crate::uniaxial::disc_below;
 
@@ -23,7 +23,7 @@ fn the_area_of_a_part_of_a_disc_is_that_of_a_fine_grid() {
             count += u32::from(u <= x && v <= y && u * u + v * v <= 1.0);
         }
         let counted = f64::from(count) * 4.0 / f64::from(n).powi(2);
-        // A grid of 2000² counts areas to some 1e-3 of its boundary's cells.
+        // A grid of 2000² counts areas to about 1e-3 of the cells on its boundary.
         assert!((disc_below(x, y) - counted).abs() < 2e-3, "{x} {y}");
     }
 }

@@ -1,4 +1,4 @@
-//! Averages against brute force, their sum, and the reference numbers.
+//! Compares averages with brute force, their sum, and reference numbers.
 
 use crate::pixel_average::{Disc, Profile, SMOOTH, corner};
 use std::f64::consts::PI;
@@ -35,8 +35,8 @@ fn averages_agree_with_brute_force_for_oblong_pixels_inside_and_at_the_rim() {
         let patch = disc.average(profile, [[0, 10], [0, 13]]);
         for ((r, c), &value) in patch.values.indexed_iter() {
             let slow = sampled(&disc, profile, r as isize, c as isize, 400);
-            // 400 midpoints a side miss about h^1.5 = 1e-4 of a pixel at the rim, where the slope
-            // is infinite.
+            // 400 midpoints per side have an error of about h^1.5 = 1e-4 of a pixel at the rim,
+            // where the slope is infinite.
             assert!(
                 (value - slow).abs() < 1e-4,
                 "{profile:?} row {r} column {c}: {value} {slow}"
@@ -61,7 +61,7 @@ fn the_sum_over_pixels_is_the_integral() {
         let hemisphere = disc.average(Profile::Hemisphere, window).values.sum() * 0.8;
         let paraboloid = disc.average(Profile::Paraboloid, window).values.sum() * 0.8;
         let (a2, eps) = (radius * radius, f64::EPSILON);
-        // The corners telescope; what remains is the rounding of about a² pixels of size eps·a².
+        // The corners telescope. The remainder is the rounding of about a² pixels of size eps·a².
         assert!(
             (hemisphere / (2.0 / 3.0 * PI * a2) - 1.0).abs() < 1e3 * eps,
             "{hemisphere}"
@@ -115,7 +115,7 @@ fn quadrature_and_corners_agree_where_both_hold() {
             worst = worst.max((value - exact.max(0.0)).abs());
         }
         assert!(smooth > 1000, "{smooth}");
-        // The corners' rounding: 4 ulps of 1 over a pixel of 2e-4 of the radius squared is 4e-12.
+        // Rounding of the corners: 4 ulps of 1 over a pixel of 2e-4 of the squared radius is 4e-12.
         assert!(worst < 4e-12, "{profile:?} {worst:e}");
     }
 }
@@ -131,7 +131,7 @@ fn averages_agree_with_the_reference_numbers() {
         let pitch = case["pitch"].as_f64().unwrap();
         let size = case["size"].as_u64().unwrap() as isize;
         let at = |name: &str| case["params"][name].as_f64().unwrap();
-        // There, pixel (0, 0) covers [0, h] × [0, h]; here its centre is the origin.
+        // In the reference, pixel (0, 0) covers [0, h] × [0, h]; here its centre is the origin.
         let centre_px = [at("cx") / pitch - 0.5, at("cy") / pitch - 0.5];
         let disc = Disc {
             centre_px,
@@ -139,8 +139,8 @@ fn averages_agree_with_the_reference_numbers() {
             pixel_size_m: [pitch; 2],
         };
         let found = disc.average(Profile::Hemisphere, [[0, size], [0, size]]);
-        // Near the rim, corners are of size 1 in units of the radius, a pixel of (h/a)²; the discs
-        // met by the rim have radii below 10 pixels.
+        // Near the rim, corner values are of size 1 in units of the radius, and a pixel of (h/a)².
+        // The discs whose rim is hit have radii below 10 pixels.
         let cancelled = 20.0 * f64::EPSILON * (at("a") / pitch).clamp(1.0, 10.0).powi(2);
         let Some(expected) = case["expected"]["pixels"].as_array() else {
             let is_empty = found.values.iter().all(|&v| v == 0.0);
