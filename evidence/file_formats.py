@@ -148,7 +148,7 @@ for name, expected, text in [
 for x, y in [("cx", "cy"), ("X_pos", "Y_pos"), ("centroid_x", "centroid_y"), ("Pos. X [mm]", "Pos. Y [mm]"), ("x coordinate", "y coordinate"),
              ("Center_X", "Center_Y"), ("x/mm", "y/mm"), ("x in mm", "y in mm"), ("Position X", "Position Y")]:
     case("points", f"called_{len(cases)}.csv", points * (1e-3 if "mm" in x else 1), lambda p: f"id,{x},{y}\n" + rows("{k},{x},{y}\n"))
-case("points", "records.npy", "astype(float)", lambda p: np.save(p, frame.to_records(index=False)))
+case("points", "records.npy", "numpy.savez", lambda p: np.save(p, frame.to_records(index=False)))
 case("points", "objects.npy", "astype(float)", lambda p: np.save(p, points.astype(object), allow_pickle=True))
 case("points", "rate.npz", points, lambda p: np.savez(p, points=points, fps=30.0))
 case("points", "rate.mat", points, lambda p: scipy.io.savemat(p, {"points": points, "fps": 30.0}))
@@ -289,6 +289,214 @@ case("frames", "cut_in_half.jpg", "cut short", lambda p: jpegs[11][: len(jpegs[1
 case("frames", "table_for_frames.csv", "a text that begins", lambda p: frame.to_csv(p, index=False))
 case("frames", "truncated.jpg", "cannot use the image", lambda p: jpegs[0][:300])
 
+# More of tables: marks of order and ends of lines, quotes, several lines of headings, numbers in other notations, other kinds of arrays.
+euro = comma(rows("{x};{y}\n"))
+for name, expected, text in [
+    ("excel_german.csv", points * 1e-3, ("\ufeff\"x [mm]\";\"y [mm]\"\n" + euro).replace("\n", "\r\n")),
+    ("excel_french.csv", points, "\ufeffx;y;remarque\r\n" + comma(rows("{x};{y};point {k}\r\n"))),
+    ("quoted_comma.csv", points, '"note, free",x,y\n' + rows('"gel, soft",{x},{y}\n')),
+    ("quoted_decimals.csv", points, '"x","y"\n' + comma(rows('"{x}";"{y}"\n')).replace('"x","y"', '"x";"y"')),
+    ("quoted_thousands.csv", "line 2, column 1", 'x,y\n' + rows('"1,{k}00.5",{y}\n')),
+    ("mixed_decimals.csv", "a decimal comma", "x;y\n1,234;2.5\n2,345;3.5\n4,5;1.5\n"),
+    ("apostrophes.csv", "line 2, column 1", "x;y\n" + rows("1'{k}00.5;{y}\n")),
+    ("blank_thousands.csv", "line 2, column 1", "x;y\n" + rows("1 {k}00,5;{y}\n")),
+    ("hexadecimal.csv", "line 2, column 1", "x,y\n" + rows("0x{k}F,{y}\n")),
+    ("with_units.csv", "line 2, column 1", "x,y\n" + rows("{x} mm,{y} mm\n")),
+    ("percent.csv", "line 2, column 1", "x,y\n" + rows("{x}%,{y}%\n")),
+    ("signs.csv", points, "x,y\n" + rows("+{x},+{y}\n")),
+    ("exponents.csv", points, "x,y\n" + "".join(f"{x:E},{y:.12e}\n" for x, y in points)),
+    ("half_numbers.csv", [[0.5, 1.0], [1.5, 2.0], [3.0, 4.5]], "x,y\n.5,1.\n1.5,2.\n3.,4.5\n"),
+    ("typeset_minus.csv", points * [-1, 1], "x,y\n" + rows("\u2212{x},{y}\n")),
+    ("errors.csv", [[1.0, 2.0], [3.0, 4.5], [4.0, 5.0]], "x,y\n1,2\n3,4.5\n#DIV/0!,3\n4,5\n#N/A,7\n"),
+    ("hole_ind.csv", points, "x,y\n-nan,3\nnan(ind),3\n".replace("nan(ind),3\n", "") + rows("{x},{y}\n")),
+    ("overflow.csv", "line 2, column 1", "x,y\n1e400,2\n1,2\n"),
+    ("trailing_commas.csv", points, "x,y,\n" + rows("{x},{y},\n")),
+    ("trailing_many.csv", points, "x,y,,,\n" + rows("{x},{y},,,\n")),
+    ("trailing_rows.csv", points, "x,y\n" + rows("{x},{y},\n")),
+    ("ragged_short.csv", "line 3", "x,y,z\n1,2,3\n4,5\n6,7,8\n"),
+    ("ragged_long.csv", "line 3", "x,y\n1,2\n3,4,5\n6,7\n"),
+    ("blank_lines.csv", points, "\n\nx,y\n\n" + rows("{x},{y}\n\n")),
+    ("heading_again.csv", "line 14, column 1", "x,y\n" + rows("{x},{y}\n") + "x,y\n1,2\n"),
+    ("multiindex.csv", points, pd.DataFrame(np.c_[points, points[:, :1]], columns=pd.MultiIndex.from_tuples([("a", "x"), ("a", "y"), ("b", "q")])).to_csv(index=False)),
+    ("multiindex_2.csv", points, pd.DataFrame(points, columns=pd.MultiIndex.from_tuples([("a", "x"), ("a", "y")])).to_csv(index=False)),
+    ("multiindex_rows.csv", points, frame.set_index(pd.MultiIndex.from_product([["a", "b"], range(6)])).to_csv()),
+    ("deeplabcut.csv", points, "scorer,DLC,DLC,DLC\nbodyparts,dot,dot,dot\ncoords,x,y,likelihood\n" + rows("{k},{x},{y},0.99\n")),
+    ("sleap.csv", points, "track,frame_idx,instance.score,nose.x_1,nose.y_1\n" + rows(",{k},0.9,{x},{y}\n")),
+    ("index_name.csv", points, frame.rename_axis("id").to_csv()),
+    ("pandas_long_float.csv", points, frame.to_csv(float_format="%.17g")),
+    ("times.csv", points, "time,x,y\n" + rows("2024-05-01 12:00:{k}.5,{x},{y}\n")),
+    ("booleans.csv", points, "x,y,seen\n" + rows("{x},{y},True\n")),
+    ("imagej_index.csv", points, "\tX\tY\n" + rows("{k}\t{x}\t{y}\n")),
+    ("comment_marks.txt", points, "% rig 7\n# x y\n" + rows("{x} {y}\n")),
+    ("comment_end.csv", points, "x,y\n" + rows("{x},{y}\n") + "# end\n"),
+    ("aligned_comma.csv", points, "     x,      y\n" + rows("  {x},  {y}\n")),
+    ("aligned_tab.txt", points, "x\t\ty\n".replace("\t\t", "\t") + rows("{x} \t {y}\n")),
+    ("names_of_words.txt", "columns", "Position X   Position Y\n" + rows("{x}   {y}\n")),
+    ("wavefront.obj", "columns", rows("v {x} {y} 0\n")),
+    ("molecule.xyz", "--skip-lines 2", "12\nfrom a tracker\n" + rows("{k} {x} {y} 0\n")),
+    ("shape.off", "--skip-lines", "OFF\n12 0 0\n" + rows("{x} {y} {k}\n")),
+    ("legacy.vtk", "--skip-lines", "# vtk DataFile Version 3.0\npoints\nASCII\nDATASET POLYDATA\nPOINTS 12 float\n" + rows("{x} {y} {k}\n")),
+    ("pretty.json", "JSON", json.dumps(points.tolist(), indent=2)),
+    ("flat.json", "JSON", json.dumps(points[:, 0].tolist())),
+    ("lines.jsonl", "JSON", frame.to_json(orient="records", lines=True)),
+    ("list_of_one.json", "JSON", '["x", "y"]'),
+    ("data.xml", "XML", '<?xml version="1.0"?><points/>'),
+    ("data.yaml", "columns", "x:\n - 1\n - 2\n"),
+    ("latex.tex", points, "x & y \\\\\n" + rows("{x} & {y} \\\\\n")),
+    ("spaces_only.csv", "at least one row", "   \n  \n"),
+    ("heading_only.csv", "at least one row", "x,y\n"),
+    ("holes_only.csv", "at least one row", "x,y\nnan,nan\n,\n"),
+    ("comments_only.txt", "at least one row", "# x y\n# none\n"),
+]:
+    case("points", name, np.array(expected) if isinstance(expected, list) else expected, lambda p: text.encode())
+for encoding, expected in [("utf-16-le", "export it as CSV"), ("utf-32", "UTF-16"), ("cp1252", points)]:
+    case("points", f"{encoding}.csv", expected, lambda p: frame.to_csv(p, index=False, encoding=encoding))
+for dtype in ["<f2", "<i8", "<u4", ">i2", ">f4", "?"]:
+    for order in "CF":
+        numbers = points if dtype != "?" else points * 0 + [[1, 0]] * 12
+        expected = "astype(float)" if dtype == "<f2" else numbers.astype(dtype).astype(float)
+        if dtype != "?":
+            case("points", f"array_{len(cases)}.npy", expected, lambda p: np.save(p, np.asarray(points.astype(dtype), order=order)))
+structured = np.rec.fromarrays([points[:, 0], points[:, 1], np.arange(12)], dtype=[("x", "<f8"), ("y", "<f8"), ("id", "<i4")])
+case("points", "structured.npy", "numpy.savez", lambda p: np.save(p, np.array(structured)))
+case("points", "structured.npz", "save arrays of numbers", lambda p: np.savez(p, tracks=np.array(structured)))
+case("points", "text.npy", "astype(float)", lambda p: np.save(p, np.array(["a", "b"])))
+case("points", "dates.npy", "astype(float)", lambda p: np.save(p, np.array(["2024-01-01"], "M8[D]")))
+case("points", "none.npy", "at least one row", lambda p: np.save(p, np.zeros((0, 2))))
+case("points", "none.npz", "at least one row", lambda p: np.savez(p, points=np.zeros((0, 2))))
+case("points", "none.mat", "at least one row", lambda p: scipy.io.savemat(p, {"points": np.zeros((0, 2))}))
+case("points", "holes.npy", holed, lambda p: np.save(p, holes.to_numpy()))
+case("points", "all_holes.npy", "at least one row", lambda p: np.save(p, points * np.nan))
+case("points", "infinite.npy", "line 3, column 2", lambda p: np.save(p, np.array([[1, 2], [3, 4], [5, np.inf]])))
+case("points", "beside_text.npz", points, lambda p: np.savez(p, points=points, name="gel", unit=np.array(["mm"])))
+case("points", "complex.mat", "array of numbers", lambda p: scipy.io.savemat(p, {"points": points + 1j}))
+case("points", "cell.mat", "save arrays of numbers", lambda p: scipy.io.savemat(p, {"c": np.array([points, points[:3]], dtype=object)}))
+case("points", "sparse.mat", "save arrays of numbers", lambda p: scipy.io.savemat(p, {"s": scipy.sparse.csc_matrix(points)}))
+case("points", "level_4.mat", "export it as CSV", lambda p: scipy.io.savemat(p, {"points": points}, format="4"))
+for dtype in ["i1", "u2", "i4", "i8", "f4"]:
+    case("points", f"kind_{dtype}.mat", points.astype(dtype).astype(float), lambda p: scipy.io.savemat(p, {"points": points.astype(dtype)}))
+case("points", "text_beside.mat", points, lambda p: scipy.io.savemat(p, {"points": points, "name": "gel", "settings": {"a": 1.0}}))
+
+
+def spreadsheet(names):
+    def write(p):
+        with zipfile.ZipFile(p, "w", zipfile.ZIP_DEFLATED) as file:
+            for name in names:
+                file.writestr(name, "<xml/>")
+    return write
+
+
+case("points", "book.xlsx", "saved as CSV", spreadsheet(["[Content_Types].xml", "xl/workbook.xml", "xl/worksheets/sheet1.xml"]))
+case("points", "book.ods", "saved as CSV", spreadsheet(["mimetype", "content.xml"]))
+for name, magic in [("table.parquet", b"PAR1\x15\x04"), ("table.feather", b"ARROW1\0\0"), ("book.xls", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"), ("table.sqlite", b"SQLite format 3\0")]:
+    case("points", name, "export it as CSV", lambda p: magic + bytes(range(256)) * 4)
+for module, end in [("bz2", "bz2"), ("lzma", "xz")]:
+    case("points", f"packed.csv.{end}", "export it as CSV", lambda p: __import__(module).compress(frame.to_csv(index=False).encode()))
+case("normals", "normals.npz", "up", lambda p: np.savez(p, n=normals, mask=np.ones((32, 48), bool)))
+case("normals", "normals_axes.npy", "up", lambda p: np.save(p, np.moveaxis(normals, 2, 0)))
+case("normals", "normals_fortran.npy", "up", lambda p: np.save(p, np.asfortranarray(normals.astype(">f4"))))
+case("normals", "normals_alpha.png", "up", lambda p: cv2.imwrite(str(p), np.round((np.dstack([normals[..., ::-1], normals[..., 2] * 0 + 1]) + 1) / 2 * 255).astype("u1")) and None)
+case("normals", "normals_table.npy", "shape (rows, columns, 3)", lambda p: np.save(p, points))
+for name, text in [("brackets", "darkness [grey_levels];depth [mm]\n"), ("slash", "Darkness/px;Depth/mm\n"), ("plain", "darkness;depth\n")]:
+    case("depth", f"depth_{name}.csv", depths[11:], lambda p: text + comma("".join(f"{g};{d:.3f}\n" for g, d in zip(grey, depth))))
+case("depth", "depth_feet.csv", "m or a multiple", lambda p: "darkness,depth (ft)\n" + "".join(f"{g},{d}\n" for g, d in zip(grey, depth)))
+
+# More of frames: kinds of PNG, JPEG, TIFF, YUV4MPEG2, AVI and NPY.
+from PIL import Image
+
+last = Image.fromarray(frames[11])
+tinted = np.stack([frames[11], frames[11], frames[11]], 2)
+for name, image in [("palette.png", last.convert("P")), ("rgba.png", last.convert("RGBA")), ("adaptive.png", last.convert("RGB").quantize(200)),
+                    ("palette.tif", last.convert("P")), ("rgba.tif", last.convert("RGBA"))]:
+    case("frames", name, depths[11:] if name != "palette.tif" else "it is stored in a way that is not read", lambda p: image.save(p))
+case("frames", "sixteen_alpha.png", depths[11:], lambda p: cv2.imwrite(str(p), np.dstack([tinted.astype("u2") * 257, np.full((32, 48), 65535, "u2")])) and None)
+case("frames", "one_bit.png", depths[11:] * 0 + 1.9, lambda p: Image.fromarray(frames[11] > 140).save(p))
+for turn in [1, 3]:
+    exif = Image.Exif()
+    exif[0x0112] = turn
+    case("frames", f"exif_{turn}.jpg", depths[11:], lambda p: last.save(p, quality=98, exif=exif))
+sideways = Image.Exif()
+sideways[0x0112] = 6
+case("frames", "exif_6.jpg", depths[11:], lambda p: Image.fromarray(np.rot90(frames[11]).copy()).save(p, quality=98, exif=sideways))
+case("frames", "cmyk.jpg", depths[11:], lambda p: last.convert("CMYK").save(p, quality=98))
+case("frames", "restart.jpg", depths[11:], lambda p: cv2.imencode(".jpg", frames[11], [cv2.IMWRITE_JPEG_RST_INTERVAL, 2, cv2.IMWRITE_JPEG_QUALITY, 98])[1].tobytes())
+case("frames", "animated.png", "frames as PNG", lambda p: last.save(p, save_all=True, append_images=[Image.fromarray(f) for f in frames[:3]]))
+case("frames", "animated.gif", "save its frames as PNG", lambda p: last.save(p, save_all=True, append_images=[Image.fromarray(f) for f in frames[:3]]))
+case("frames", "animated.webp", "save it as PNG", lambda p: last.save(p, save_all=True, append_images=[Image.fromarray(f) for f in frames[:3]]))
+case("frames", "multipart.mjpeg", depths, lambda p: b"".join(b"--frame\r\nContent-Type: image/jpeg\r\n\r\n" + j + b"\r\n" for j in jpegs))
+case("frames", "damaged.png", "damaged", lambda p: pngs[11][:60] + bytes([pngs[11][60] ^ 255]) + pngs[11][61:])
+case("frames", "cut.png", "damaged or cut", lambda p: pngs[11][: len(pngs[11]) // 2])
+for compression in ["lzw", "packbits", "jpeg", "zstd", "webp", "lzma"]:
+    read_too = compression in ("lzw", "packbits", "jpeg")
+    case("frames", f"pressed_{compression}.tif", depths if read_too else "it is stored in a way that is not read",
+         lambda p: tifffile.imwrite(p, stack if compression != "webp" else np.repeat(stack[..., None], 3, 3), compression=compression,
+                                    photometric="minisblack" if compression != "webp" else "rgb"))
+case("frames", "predictor.tif", depths, lambda p: tifffile.imwrite(p, stack, compression="lzw", predictor=2, photometric="minisblack"))
+case("frames", "strips.tif", depths, lambda p: tifffile.imwrite(p, stack, rowsperstrip=5, photometric="minisblack"))
+case("frames", "planes.tif", depths, lambda p: tifffile.imwrite(p, np.repeat(stack[:, None], 3, 1), photometric="rgb", planarconfig="separate"))
+case("frames", "imagej_one_page.tif", depths[:1], lambda p: tifffile.imwrite(p, stack, imagej=True, truncate=True))
+case("frames", "cut.tif", "cut short", lambda p: p.write_bytes((folder / "strips.tif").read_bytes()[:700]) and None)
+
+
+def mixed(p):
+    with tifffile.TiffWriter(p) as file:
+        for k, f in enumerate(frames):
+            file.write(f, photometric="minisblack", contiguous=False)
+            if k == 4:
+                file.write(f[::4, ::4], photometric="minisblack", contiguous=False)
+
+
+case("frames", "mixed_sizes.tif", depths, mixed)
+quarter, halfs, fulls = bytes([128]) * 768, bytes([128]) * 1536, bytes([128]) * 3072
+deep = lambda bits: [(f.astype("<u2") << (bits - 8)).tobytes() for f in frames]
+eight = [f.tobytes() for f in frames]
+for space, luma, rest in [("mono", eight, b""), ("422", eight, halfs), ("444", eight, fulls), ("411", eight, quarter), ("420mpeg2", eight, quarter), ("420paldv", eight, quarter),
+                          ("444alpha", eight, fulls + fulls[:1536]), ("420p10", deep(10), quarter * 2), ("422p12", deep(12), halfs * 2), ("444p16", deep(16), fulls * 2), ("mono10", deep(10), b""), ("mono16", deep(16), b"")]:
+    case("frames", f"space_{space}.y4m", depths, lambda p: b"YUV4MPEG2 W48 H32 F25:1 Ip A1:1 C" + space.encode() + b" XYSCSS=420JPEG\n" + b"".join(b"FRAME Ippp\n" + d + rest for d in luma))
+case("frames", "space_none.y4m", depths, lambda p: b"YUV4MPEG2 W48 H32 F25:1\n" + b"".join(b"FRAME\n" + d + quarter for d in eight))
+case("frames", "space_rgb.y4m", "colour space", lambda p: b"YUV4MPEG2 W48 H32 F25:1 Crgb\n" + b"".join(b"FRAME\n" + d * 3 for d in eight))
+
+
+def with_sound(data, odd=b"", second=b""):
+    """An AVI whose first stream is sound, with index, filling, lists of records and a further part."""
+    plain = avi(b"MJPG", data)
+    movi = plain.index(b"movi") + 4
+    sound = chunk(b"LIST", b"strl" + chunk(b"strh", b"auds" + bytes(52)) + chunk(b"strf", bytes(18)))
+    at = plain.index(b"LIST", plain.index(b"avih"))
+    frames_in = b"".join(chunk(b"01wb"[:0] + b"00wb", b"pcm" + odd) + chunk(b"LIST", b"rec " + chunk(b"01dc", d)) + chunk(b"JUNK", b"x" * 7) for d in data)
+    head = plain[12 : movi - 12]
+    head = head[: at - 12] + sound + head[at - 12 :]
+    return chunk(b"RIFF", b"AVI " + head + chunk(b"LIST", b"movi" + frames_in) + chunk(b"idx1", bytes(32))) + second
+
+
+case("frames", "sound.avi", depths, lambda p: with_sound(jpegs))
+case("frames", "sound_odd.avi", depths, lambda p: with_sound(jpegs, b"??"))
+case("frames", "dib_names.avi", depths, lambda p: avi(b"DIB ", [np.repeat(f[::-1, :, None], 3, 2).tobytes() for f in frames]).replace(b"00dc", b"00db"))
+case("frames", "grey_8.avi", "ffmpeg -i", lambda p: avi(b"\0\0\0\0", [f[::-1].tobytes() for f in frames], 8))
+case("frames", "bgra.avi", "ffmpeg -i", lambda p: avi(b"\0\0\0\0", [np.repeat(f[::-1, :, None], 4, 2).tobytes() for f in frames], 32))
+case("frames", "nv12.avi", depths, lambda p: avi(b"NV12", [f.tobytes() + half for f in frames], 12))
+case("frames", "open_end.avi", depths, lambda p: avi(b"MJPG", jpegs).replace(len(jpegs).to_bytes(4, "little") + bytes(4) + (1).to_bytes(4, "little"), bytes(8) + (1).to_bytes(4, "little"), 1))
+case("frames", "one_axis.npy", depths, lambda p: np.save(p, stack[..., None]))
+case("frames", "rgba.npy", "uint8 or uint16", lambda p: np.save(p, np.repeat(stack[..., None], 4, 3)))
+case("frames", "bool.npy", "uint8 or uint16", lambda p: np.save(p, stack > 100))
+case("frames", "big_endian.npy", depths, lambda p: np.save(p, (stack.astype("u2") * 257).astype(">u2")))
+case("frames", "version_2.npy", depths, lambda p: np.lib.format.write_array(open(p, "wb"), stack, version=(2, 0)))
+case("frames", "with_times.npz", depths, lambda p: np.savez(p, times=np.arange(12.0), frames=stack, numbers=np.arange(12)))
+case("frames", "one_by_one.npz", depths, lambda p: np.savez(p, *frames))
+case("frames", "no_frames.npy", "at least one frame", lambda p: np.save(p, stack[:0]))
+case("frames", "frames.mat", "numpy.save", lambda p: scipy.io.savemat(p, {"frames": stack}))
+case("frames", "packed.y4m.gz", "unpack it", lambda p: __import__("gzip").compress(b"YUV4MPEG2 W48 H32\n"))
+for name, magic in [("photo.heic", bytes(4) + b"ftypheic"), ("photo.avif", bytes(4) + b"ftypavif"), ("wide.hdr", b"#?RADIANCE\n"), ("wide.exr", b"\x76\x2f\x31\x01"), ("icon.ico", b"\0\0\1\0")]:
+    case("frames", name, "PNG" if name[:4] != "phot" else "not read", lambda p: magic + bytes(range(200, 256)) * 9)
+pam = b"P7\nWIDTH 48\nHEIGHT 32\nDEPTH 1\nMAXVAL 255\nTUPLTYPE GRAYSCALE\nENDHDR\n" + eight[11]
+case("frames", "grey.pam", depths[11:], lambda p: pam)
+case("frames", "two.pam", "write binary PGM", lambda p: pam[:-1536] + eight[10] + pam)
+case("frames", "bits.pbm", depths[:1], lambda p: b"P4\n48 32\n" + bytes(192))
+case("frames", "float.pfm", "PNG", lambda p: b"Pf\n48 32\n-1.0\n" + frames[11].astype("<f4").tobytes())
+case("frames", "twelve.pgm", depths, lambda p: b"".join(b"P5\n# rig\n48 32\n4095\n" + (np.round(f / 255 * 4095).astype(">u2")).tobytes() for f in frames))
+case("frames", "pipe.ppm", depths, lambda p: b"".join(b"P6 48 32 255\n" + np.repeat(f[..., None], 3, 2).tobytes() for f in frames))
+case("frames", "text.ppm", depths[11:], lambda p: "P3\n48 32\n255\n" + " ".join(map(str, np.repeat(frames[11][..., None], 3, 2).ravel())))
+
 (folder / "cases.txt").write_text("".join(f"{kind} {path}\n" for kind, path, _ in cases))
 print(len(cases), "files in", folder)
 
@@ -321,7 +529,7 @@ if len(sys.argv) > 2:
     for kind, path, expected in cases:
         code, found = read(sys.argv[2], kind, path)
         if isinstance(expected, str) and kind != "normals" or isinstance(found, str) and code == 2:
-            fits = code == 2 and expected in found and found.count("\n") == 1 and not FOREIGN.search(found.replace(path.name, ""))
+            fits = code == 2 and isinstance(expected, str) and expected in found and found.count("\n") == 1 and not FOREIGN.search(found.replace(path.name, ""))
         elif isinstance(expected, str):
             fits = found == expected
         else:

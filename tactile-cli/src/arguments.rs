@@ -1,15 +1,15 @@
 //! Arguments of several subcommands: numbers, repetitions, tables, masks and known heights.
 use crate::console::{Context, Interrupt, median_ms};
 use crate::failure::Failure;
-use crate::text::four_digits;
+use crate::text::{count, four_digits, printable};
 use clap::{Args, ValueEnum};
 use ndarray::Array2;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tactile_files::io::{
-    Gaps, Grey, InputQuantity, Points, TableOptions, read_displaced_points, read_grey_image,
-    read_grid, read_point_frames, read_table_with,
+    FileError, Gaps, Grey, InputQuantity, Points, TableOptions, read_displaced_points,
+    read_grey_image, read_grid, read_point_frames, read_table_with,
 };
 
 fn number(text: &str, fits: impl Fn(f64) -> bool, expected: &str) -> Result<f64, String> {
@@ -160,53 +160,94 @@ impl TableArguments {
         Ok(columns)
     }
 
-    /// Tables of points, and whether their coordinates have a unit: those of all files or of none.
-    /// A table of tracked points gives one for each of its frames, and one file alone of a single frame
-    /// has displacements beside its points. Row i of one that is paired is row
-    /// i of the others, and NaN stands for numbers that are not there.
+    /// Frames of points. A table of tracked points has several, and one file alone of a single frame
+    /// has displacements beside its points. Row i of one that is paired is row i of the others, and NaN
+    /// stands for numbers that are not there. An empty file of a series is an empty frame.
     pub(crate) fn read_points(
         &self,
         paths: &[impl AsRef<Path>],
-        paired: bool,
+        [paired, series]: [bool; 2],
         context: &mut Context,
-    ) -> Result<(Vec<Points>, bool), Failure> {
+    ) -> Result<PointFrames, Failure> {
         let mut options = self.options();
         if paired && !self.strict {
             options.gaps = Gaps::Keep;
         }
-        let mut tables = Vec::new();
+        let (mut frames, mut empty) = (Vec::<PointFrame>::new(), Vec::new());
         for path in paths {
             let path = path.as_ref();
-            let frames = match (paths.len(), options.columns.len()) {
-                (1, 4 | 6) => Vec::new(),
-                _ => read_point_frames(path, &options)?,
+            let file = printable(&path.display().to_string());
+            let read = match (paths.len(), options.columns.len()) {
+                (1, 4 | 6) => Ok(Vec::new()),
+                _ => read_point_frames(path, &options),
             };
-            // One table alone, of one frame, has displacements beside its points.
-            let frames = match (paths.len(), frames.len()) {
-                (1, 0 | 1) => {
-                    options.gaps = if self.strict {
-                        Gaps::Refuse
-                    } else {
-                        Gaps::Keep
-                    };
+            let read = match read {
+                Err(FileError::Empty { .. }) if series => {
+                    empty.push(file);
+                    continue;
+                }
+                Ok(found) if paths.len() == 1 && found.len() < 2 => {
+                    if !self.strict {
+                        options.gaps = Gaps::Keep;
+                    }
                     vec![read_displaced_points(path, &options)?]
                 }
-                _ => frames,
+                read => read?,
             };
-            taken(path, &frames[0].notes, context);
-            tables.extend(frames);
-            if tables.last().map(|table| table.metric) != Some(tables[0].metric) {
+            taken(path, &read[0].notes, context);
+            let several = read.len() > 1;
+            for (k, points) in read.into_iter().enumerate() {
+                let number = frames.len() + empty.len() + 1;
+                let name = match several {
+                    true => format!("{file} frame {}", k + 1),
+                    false => file.clone(),
+                };
+                match points.rows.is_empty() {
+                    true => empty.push(name),
+                    false => frames.push(PointFrame {
+                        number,
+                        name,
+                        points,
+                    }),
+                }
+            }
+            if let [first, .., last] = &frames[..]
+                && first.points.metric != last.points.metric
+            {
                 return Err(Failure::input(format!(
                     "only one of {} and {} names the unit of its coordinates: name it in both \
                      headers or in none",
-                    paths[0].as_ref().display(),
-                    path.display()
+                    first.name, last.name
                 )));
             }
         }
-        let metric = tables.first().is_some_and(|table| table.metric);
-        Ok((tables, metric))
+        if let [first, ..] = &empty[..] {
+            let of_all = count(empty.len() + frames.len(), "frame");
+            let sentence = format!(
+                "{} of {of_all} without points passed over, the first {first}",
+                empty.len()
+            );
+            context.warn("frames_empty", json!({ "frames": empty.len() }), sentence);
+        }
+        Ok(PointFrames {
+            frames,
+            empty: empty.len(),
+        })
     }
+}
+
+/// Frames of points. Their coordinates have a unit in all or in none.
+pub(crate) struct PointFrames {
+    pub frames: Vec<PointFrame>,
+    /// The number of frames without points, which were passed over.
+    pub empty: usize,
+}
+
+/// Points, the number of their frame, from 1 among all that were given, and its name.
+pub(crate) struct PointFrame {
+    pub number: usize,
+    pub name: String,
+    pub points: Points,
 }
 
 /// Prints what was taken for granted of a table.

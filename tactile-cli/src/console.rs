@@ -97,9 +97,12 @@ impl Context {
         self.row(name, value);
     }
 
-    /// A sentence about the input for the person at the terminal, and for the report.
+    /// A sentence about an input that is left out, for the person at the terminal, the report and the
+    /// JSON object.
     pub(crate) fn caution(&mut self, text: impl Display) {
         let text = text.to_string();
+        self.cautions
+            .push(json!({ "kind": "input_left_out", "text": text }));
         if let Some(report) = &mut self.outputs.report {
             report.caution(&text, "");
         }

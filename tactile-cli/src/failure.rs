@@ -76,9 +76,7 @@ impl Failure {
 
 impl Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // Decoders of images say what is wrong in several lines, and go on with their own data.
-        let own = self.sentence.split(" while decoding ChunkType").next();
-        let words: Vec<&str> = own.unwrap_or_default().split_whitespace().collect();
+        let words: Vec<&str> = self.sentence.split_whitespace().collect();
         f.write_str(&printable(&words.join(" ")))
     }
 }

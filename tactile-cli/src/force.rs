@@ -60,11 +60,9 @@ pub(crate) fn run(arguments: &ForceArguments, context: &mut Context) -> Result<E
     let mut session = pipeline
         .and_then(|pipeline| Session::new(&pipeline, &[image.view()]))
         .map_err(|error| Failure::in_file(&frames.reference, error))?;
-    // One frame is held at a time, but a file that cannot be read is found before the first is
-    // measured.
     let read_frames = frames.reading(Grey::default(), &image);
-    read_frames.check(&frames.frames)?;
-    line.print(context);
+    // A call without a frame that can be read prints nothing.
+    let mut heading = Some(&line);
     let mut exit = Exit::Complete;
     let mut values = Vec::new();
     let mut csv = Csv::new(
@@ -74,6 +72,9 @@ pub(crate) fn run(arguments: &ForceArguments, context: &mut Context) -> Result<E
     let unreadable =
         read_frames.each::<Array2<u8>>(&frames.frames, context, |frame, context| {
             let NamedFrame { name, pixels, .. } = frame.named();
+            if let Some(line) = heading.take() {
+                line.print(context);
+            }
             let found = session.push(pixels.view());
             context.line(format_args!("{name}:"));
             match found {

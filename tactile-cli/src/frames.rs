@@ -9,7 +9,7 @@ use serde_json::json;
 use std::ffi::OsString;
 use std::mem::take;
 use std::path::{Path, PathBuf};
-use tactile_files::io::{FileError, FrameReader, Grey, read_grey_image};
+use tactile_files::io::{FileError, FrameReader, Grey, image_colour, read_grey_image};
 use tactile_imaging::pipeline::FrameSource;
 
 /// Frames per second where neither stream nor argument states them: those of the paper's camera.
@@ -17,6 +17,8 @@ pub(crate) const DEFAULT_RATE_HZ: f64 = 80.0;
 
 /// The pixels of a frame, grey or in colours.
 pub(crate) trait Pixels: Default {
+    const IS_GREY: bool;
+
     /// Reads the next frame in place of this one, and returns its time in seconds.
     fn read_next(&mut self, reader: &mut FrameReader) -> Result<Option<f64>, FileError>;
 
@@ -28,6 +30,8 @@ pub(crate) trait Pixels: Default {
 }
 
 impl Pixels for Array2<u8> {
+    const IS_GREY: bool = true;
+
     fn read_next(&mut self, reader: &mut FrameReader) -> Result<Option<f64>, FileError> {
         reader.next_frame(self)
     }
@@ -42,6 +46,8 @@ impl Pixels for Array2<u8> {
 }
 
 impl Pixels for Array3<u8> {
+    const IS_GREY: bool = false;
+
     fn read_next(&mut self, reader: &mut FrameReader) -> Result<Option<f64>, FileError> {
         reader.next_colour_frame(self)
     }
@@ -100,7 +106,6 @@ impl SensorFrames {
             bits: self.bits,
             reference: &self.reference,
             size: reference.dim(),
-            passes_over: false,
         }
     }
 }
@@ -113,8 +118,6 @@ pub(crate) struct Reading<'a> {
     pub reference: &'a Path,
     /// Rows and columns of the reference.
     pub size: (usize, usize),
-    /// A file that cannot be read is passed over with a caution. Else it ends the call.
-    pub passes_over: bool,
 }
 
 impl Reading<'_> {
@@ -137,19 +140,12 @@ impl Reading<'_> {
         Ok(true)
     }
 
-    /// Finds a file that cannot be read before the first one is measured. A pipe is read once.
-    pub(crate) fn check(&self, paths: &[PathBuf]) -> Result<(), Failure> {
-        let files = paths.iter().filter(|path| *path != Path::new("-"));
-        let mut frame = Array2::zeros((0, 0));
-        for path in files {
-            self.next(&mut self.open(path)?, path, &mut frame)?;
-        }
-        Ok(())
-    }
-
     /// Gives the frames of these files one after the other to `work`, in the memory of one frame,
-    /// until Ctrl-C. A stream that breaks off is a caution, and the next file follows. Returns how
-    /// many files and frames could not be read.
+    /// until Ctrl-C. A file that cannot be read, or breaks off, is a caution, and the next one
+    /// follows. Returns how many files and frames could not be read.
+    ///
+    /// # Errors
+    /// That of the first file, if none has a frame.
     pub(crate) fn each<P: Pixels>(
         &self,
         paths: &[PathBuf],
@@ -158,6 +154,7 @@ impl Reading<'_> {
     ) -> Result<usize, Failure> {
         let mut bar = Bar::of(paths.len(), "measuring");
         let (mut pixels, mut unreadable) = (P::default(), 0);
+        let (mut failures, mut any, mut colours) = (Vec::new(), false, Colours::Unknown);
         context.interrupt.polled(true);
         for (file, path) in paths.iter().enumerate() {
             if context.interrupt.requested() {
@@ -169,6 +166,13 @@ impl Reading<'_> {
                     match self.next(source, path, &mut pixels) {
                         Ok(true) => number += 1,
                         ended => return Ok(ended.map(|_| ())),
+                    }
+                    failures
+                        .drain(..)
+                        .for_each(|failure| context.caution(failure));
+                    any = true;
+                    if number == 1 && P::IS_GREY {
+                        colours.compare(self.reference, path, source.colour(), context);
                     }
                     let frame = Arrived {
                         path,
@@ -193,16 +197,19 @@ impl Reading<'_> {
                 Err(failure) => Err(failure),
             };
             if let Err(failure) = ended {
-                if number == 0 && !self.passes_over {
-                    return Err(failure);
-                }
                 unreadable += 1;
-                context.caution(failure);
+                match any {
+                    true => context.caution(failure),
+                    false => failures.push(failure),
+                }
             }
             bar.done(file + 1);
         }
         context.interrupt.polled(false);
-        Ok(unreadable)
+        match failures.into_iter().next() {
+            Some(failure) => Err(failure),
+            None => Ok(unreadable),
+        }
     }
 
     /// All frames of these files, and how many files and frames could not be read.
@@ -238,6 +245,67 @@ fn passed_over(path: &Path, source: &FrameReader, context: &mut Context) -> usiz
         context.warn("frames_dropped", json!({ "frames": dropped }), sentence);
     }
     damaged as usize
+}
+
+/// Mean red, green and blue of an image, `None` for a grey one.
+type Colour = Option<[f64; 3]>;
+
+/// Share of the difference of two frames' mean colours that is left if red and blue of one are
+/// exchanged, below which they were. Colours of one kind of light differ by less than this.
+const EXCHANGED: f64 = 0.5;
+
+/// What is known of the colours of the frames and their reference.
+pub(crate) enum Colours {
+    Unknown,
+    /// Those of the reference.
+    Reference(Colour),
+    /// A caution was given: one is enough.
+    Warned,
+}
+
+impl Colours {
+    /// Cautions if a frame is in colour and its reference is grey, or the other way round, or if red
+    /// and blue of one are exchanged.
+    pub(crate) fn compare(
+        &mut self,
+        reference: &Path,
+        path: &Path,
+        frame: Colour,
+        context: &mut Context,
+    ) {
+        if let Self::Unknown = self {
+            // A sensor file has no colours of its own, and its reference was read before.
+            *self = image_colour(reference).map_or(Self::Warned, Self::Reference);
+        }
+        let Self::Reference(rest) = *self else {
+            return;
+        };
+        let (path, reference) = (path.display(), reference.display());
+        let remedy = "Save both alike, and as those of the calibration";
+        let sentence = match (rest, frame) {
+            (None, Some(_)) => format!(
+                "{path} is in colour and {reference} is grey: its channels are weighed as those of \
+                 an image in red, green and blue. {remedy}"
+            ),
+            (Some(_), None) => format!("{path} is grey and {reference} is in colour. {remedy}"),
+            (Some(rest), Some([r, g, b]))
+                if off(rest, [b, g, r]) < EXCHANGED * off(rest, [r, g, b]) =>
+            {
+                format!("red and blue of {path} seem to be exchanged against {reference}. {remedy}")
+            }
+            _ => return,
+        };
+        context.warn(
+            "colours_differ",
+            json!({ "frame": path.to_string() }),
+            sentence,
+        );
+        *self = Self::Warned;
+    }
+}
+
+fn off(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
 }
 
 /// A frame as it comes.

@@ -67,7 +67,6 @@ pub(crate) fn run(arguments: &MarkersArguments, context: &mut Context) -> Result
         bits: None,
         reference,
         size: rest.dim(),
-        passes_over: false,
     };
     let before = find_markers(rest.view());
     let mut field = MarkerField::at_rest(&before);

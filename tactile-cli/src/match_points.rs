@@ -378,13 +378,16 @@ fn are_tables(paths: &[PathBuf]) -> bool {
 /// One case of two tables.
 fn case_of_tables(arguments: &MatchArguments, context: &mut Context) -> Result<MatchCase, Failure> {
     let paths = &arguments.cases;
-    let (mut tables, _) = arguments.table.read_points(paths, false, context)?;
+    let mut tables = arguments
+        .table
+        .read_points(paths, [false; 2], context)?
+        .frames;
     if tables.len() > 2 {
         return Err(Failure::input(
             "a table holds several frames: `tactile strain` follows them",
         ));
     }
-    let mut next = || tables.pop().map(|table| table.points);
+    let mut next = || tables.pop().map(|table| table.points.points);
     let (target, model) = (next(), next());
     let points = match (model, target) {
         (Some(PointTable::Plane(model)), Some(PointTable::Plane(target))) => {

@@ -2,7 +2,7 @@
 use crate::arguments::{Repetition, force_n};
 use crate::console::{Bar, Context};
 use crate::failure::{Exit, Failure};
-use crate::frames::{NamedFrame, Reading, frames_help};
+use crate::frames::{Colours, NamedFrame, Reading, frames_help};
 use crate::photometric;
 use crate::plot::{PlotError, known_heights_mm, press_pages, summary_lines};
 use crate::simulation::{Physics, Simulation};
@@ -12,7 +12,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use tactile_files::io::{Grey, image_size};
+use tactile_files::io::{Grey, image_colour, image_size};
 use tactile_files::scene::{Scene, SceneData, SceneFrame};
 use tactile_files::sensor::PhotometricPresses;
 use tactile_imaging::Pipeline;
@@ -37,8 +37,7 @@ Examples:
   tactile measure --physics hertz --radius-mm 20
   ffmpeg -i press.mp4 -vf fps=2 -f yuv4mpegpipe -pix_fmt gray - | tactile measure scene.toml -
 
-SCENE.toml (paths are relative to it; PNG, PGM, JPEG or TIFF; colour becomes grey by the luma of \
-                        Rec. 601):
+SCENE.toml (paths are relative to it; colour becomes grey by the luma of Rec. 601):
 
   reference = \"reference.png\"            # the sensor without contact
   pixel_size_m = [21.55e-6, 21.55e-6]    # x, y, on the sensing surface
@@ -106,7 +105,6 @@ impl Frames {
                 bits: scene.bits,
                 reference: &scene.reference,
                 size: data.reference.dim(),
-                passes_over: false,
             };
             let (frames, unreadable) = reading.all(&arguments.frames, context)?;
             let named = |frame: &NamedFrame| SceneFrame::new(&frame.name);
@@ -126,6 +124,12 @@ impl Frames {
             context.allow(bytes, &job, "give fewer or smaller frames")?;
         }
         let data = scene.load_without_frames().map_err(Failure::input)?;
+        let mut colours = Colours::Unknown;
+        for SceneFrame { image, .. } in &scene.frames {
+            // Loading the frames names the error of one that cannot be read.
+            let colour = image_colour(image).unwrap_or_default();
+            colours.compare(&scene.reference, image, colour, context);
+        }
         Ok(Self::Scene(Box::new((scene, data, Exit::Complete))))
     }
 

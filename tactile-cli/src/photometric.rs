@@ -168,7 +168,6 @@ impl Reader {
             bits: None,
             reference: sensor,
             size: self.stereo.shape(),
-            passes_over: false,
         }
     }
 

@@ -1,6 +1,6 @@
 //! `tactile strain`: from two sets of points, before and after a deformation.
 use self::grid::{Known, StrainGrid, arrays};
-use crate::arguments::TableArguments;
+use crate::arguments::{PointFrame, PointFrames, TableArguments};
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
 use crate::match_points::{self, Expectations};
@@ -11,7 +11,7 @@ use clap::{Args, ValueEnum};
 use nalgebra::{Matrix3, Point};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
-use tactile_files::io::{PointTable, Points};
+use tactile_files::io::PointTable;
 use tactile_imaging::elasticity::kinematics::StrainQuantities;
 use tactile_imaging::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
@@ -117,7 +117,7 @@ pub(crate) fn run(arguments: &StrainArguments, context: &mut Context) -> Result<
         )));
     }
     let of_grid = &GRID_FILES[..if arguments.grid.is_some() { 3 } else { 0 }];
-    let of_series = &SERIES_FILES[..if paths.len() > 2 { 2 } else { 0 }];
+    let of_series = &SERIES_FILES[..if paths.len() == 2 { 0 } else { 2 }];
     let files = [&FILES, of_grid, of_series].concat();
     context.outputs.plan(&files, paths)?;
     if arguments.paired && paths.len() > 2 {
@@ -125,41 +125,56 @@ pub(crate) fn run(arguments: &StrainArguments, context: &mut Context) -> Result<
             "--paired takes two files, or one with displacements",
         ));
     }
-    let (tables, metric) = arguments
-        .table
-        .read_points(paths, arguments.paired, context)?;
+    let reading = [arguments.paired, paths.len() > 2];
+    let PointFrames { frames, empty } = arguments.table.read_points(paths, reading, context)?;
     let mut known = arguments.paired;
-    if let [
-        Points {
-            displaced: Some(_), ..
-        },
-    ] = tables[..]
-    {
-        known = true;
-    }
-    let both = tables
-        .into_iter()
-        .flat_map(|table| [Some(table.points), table.displaced]);
-    let tables: Vec<PointTable> = both.flatten().collect();
+    let mut unit = "the points' unit";
     let (mut plane, mut space) = (Vec::new(), Vec::new());
-    for table in tables {
-        match table {
-            PointTable::Plane(points) => plane.push(points),
-            PointTable::Space(points) => space.push(points),
+    for PointFrame {
+        number,
+        name,
+        points,
+    } in frames
+    {
+        known |= points.displaced.is_some();
+        if points.metric {
+            unit = METRES;
         }
-        if !plane.is_empty() && !space.is_empty() {
-            return Err(Failure::input(format!(
-                "{} and the frames after it must all have two coordinates a point, or three",
-                paths[0].display()
-            )));
+        for table in [Some(points.points), points.displaced]
+            .into_iter()
+            .flatten()
+        {
+            let name = name.clone();
+            match table {
+                PointTable::Plane(points) => plane.push(Frame {
+                    number,
+                    name,
+                    points,
+                }),
+                PointTable::Space(points) => space.push(Frame {
+                    number,
+                    name,
+                    points,
+                }),
+            }
         }
     }
-    let unit = if metric { METRES } else { "the points' unit" };
-    if plane.is_empty() {
-        answer(space, unit, known, arguments, context)
-    } else {
-        answer(plane, unit, known, arguments, context)
+    match [plane.len(), space.len()] {
+        [0, 0 | 1] | [1, 0] => Err(Failure::input("fewer than two frames have points")),
+        [_, 0] => answer(plane, empty, unit, known, arguments, context),
+        [0, _] => answer(space, empty, unit, known, arguments, context),
+        _ => Err(Failure::input(format!(
+            "{} and the frames after it must all have two coordinates a point, or three",
+            paths[0].display()
+        ))),
     }
+}
+
+/// Points of a frame, its number from 1 among all that were given, and its name.
+struct Frame<const D: usize> {
+    number: usize,
+    name: String,
+    points: Vec<Point<f64, D>>,
 }
 
 impl StrainArguments {
@@ -174,9 +189,11 @@ impl StrainArguments {
     }
 }
 
-/// The strain between two frames or along a series, its report and its files.
+/// The strain between two frames or along a series of which so many are empty, its report and its
+/// files.
 fn answer<const D: usize>(
-    mut frames: Vec<Vec<Point<f64, D>>>,
+    mut frames: Vec<Frame<D>>,
+    empty: usize,
     unit: &'static str,
     known: bool,
     arguments: &StrainArguments,
@@ -184,20 +201,19 @@ fn answer<const D: usize>(
 ) -> Result<Exit, Failure> {
     let remedy = "take every tenth point, or cut the sets into parts";
     for pair in frames.windows(2).filter(|_| !known) {
-        match_points::allow(context, pair[0].len(), pair[1].len(), remedy)?;
+        match_points::allow(context, pair[0].points.len(), pair[1].points.len(), remedy)?;
     }
-    let measured = if known {
-        let after = frames.pop().unwrap_or_default();
-        of_known_pairs(frames.remove(0), after, unit, arguments, context)?
-    } else if frames.len() > 2 {
+    let measured = if !known && frames.len() + empty > 2 {
         series::follow(&frames, unit, arguments, context)
     } else {
-        let after = frames.pop().unwrap_or_default();
-        between(frames.remove(0), after, unit, arguments, context)?
+        let (after, before) = (frames.remove(1), frames.remove(0));
+        let strain = if known { of_known_pairs } else { between };
+        strain(before, after, unit, arguments, context)?
     };
     let Some(mut report) = measured else {
         return Ok(Exit::Interrupted);
     };
+    report.complete &= empty == 0;
     report.print(context);
     let mut value = report.json();
     let measure = arguments.measure.strain();
@@ -261,8 +277,16 @@ struct StrainReport<const D: usize> {
 
 /// The strain between two frames. None after Ctrl-C.
 fn between<const D: usize>(
-    before: Vec<Point<f64, D>>,
-    after: Vec<Point<f64, D>>,
+    Frame {
+        name: first,
+        points: before,
+        ..
+    }: Frame<D>,
+    Frame {
+        name: second,
+        points: after,
+        ..
+    }: Frame<D>,
     unit: &'static str,
     arguments: &StrainArguments,
     context: &mut Context,
@@ -273,10 +297,8 @@ fn between<const D: usize>(
     let Some(matching) = context.wait(job, move || matcher.match_points(&sets.0, &sets.1)) else {
         return Ok(None);
     };
-    let files = [0, 1].map(|k| arguments.frames[k].display());
     let matching = matching.map_err(|error| {
-        let [before, after] = files;
-        Failure::input(format!("{before} and {after} cannot be matched: {error}"))
+        Failure::input(format!("{first} and {second} cannot be matched: {error}"))
     })?;
     let partner = |(i, j): (usize, &Option<usize>)| j.map(|j| (i, j));
     let assignment = matching.assignment.iter().enumerate();
@@ -299,14 +321,21 @@ fn between<const D: usize>(
 
 /// The strain of pairs that are known, row by row. None after Ctrl-C.
 fn of_known_pairs<const D: usize>(
-    before: Vec<Point<f64, D>>,
-    after: Vec<Point<f64, D>>,
+    Frame {
+        name: first,
+        points: before,
+        ..
+    }: Frame<D>,
+    Frame {
+        name: second,
+        points: after,
+        ..
+    }: Frame<D>,
     unit: &'static str,
     arguments: &StrainArguments,
     context: &mut Context,
 ) -> Result<Option<StrainReport<D>>, Failure> {
     if before.len() != after.len() {
-        let [first, second] = [0, 1].map(|k| arguments.frames[k].display());
         let (rows, others) = (count(before.len(), "row"), after.len());
         return Err(Failure::input(format!(
             "{first} has {rows} and {second} {others}: with --paired row i of one file is row i of \

@@ -56,8 +56,7 @@ A camera or a video, by a pipe (ffmpeg has names for the cameras of every system
   … | tactile stream scene.toml - --record today.y4m --serve --report today.html
   ffmpeg -f v4l2 -i /dev/video0 -f image2pipe -c:v ppm - | tactile stream coloured_sensor.toml -
 
-Frames on the pipe are YUV4MPEG2 of 8 to 16 bits, binary PGM and PPM one after the other, arrays of
-numpy.save, or an AVI of JPEG frames. `-` works in the same way in measure, force and depth.")]
+`-` works in the same way in measure, force and depth.")]
 pub(crate) struct StreamArguments {
     /// Scene file of the sensor and the object, whose recorded frames are measured.
     #[arg(value_name = "SCENE.toml")]
@@ -390,7 +389,6 @@ fn recorded(
         bits: scene.bits,
         reference: &scene.reference,
         size: data.reference.dim(),
-        passes_over: true,
     };
     watch(&mut live, &frames, reading, arguments.rate, context)?;
     let unusable = live.counts.unusable;

@@ -79,7 +79,10 @@ const TOLERANCE: f64 = 1e-10;
 pub(crate) fn run(arguments: &WarpArguments, context: &mut Context) -> Result<Exit, Failure> {
     let inputs = [&arguments.sources, &arguments.targets, &arguments.queries];
     context.outputs.plan(&["warped.csv"], &inputs)?;
-    let (mut tables, _) = arguments.table.read_points(&inputs, false, context)?;
+    let mut tables = arguments
+        .table
+        .read_points(&inputs, [false; 2], context)?
+        .frames;
     let [sources, targets, queries] = inputs.map(|path| path.display());
     if tables.len() != inputs.len() {
         return Err(Failure::input(format!(
@@ -87,8 +90,11 @@ pub(crate) fn run(arguments: &WarpArguments, context: &mut Context) -> Result<Ex
         )));
     }
     let sets = tables.split_at_mut(1);
-    sets.0[0].keep_shared_rows(&mut sets.1[0]);
-    let tables: Vec<PointTable> = tables.into_iter().map(|table| table.points).collect();
+    sets.0[0].points.keep_shared_rows(&mut sets.1[0].points);
+    let tables: Vec<PointTable> = tables
+        .into_iter()
+        .map(|table| table.points.points)
+        .collect();
     match &tables[..] {
         [
             PointTable::Plane(a),

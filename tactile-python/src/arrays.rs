@@ -52,9 +52,13 @@ fn two_axes<'py, T: Element>(
     }
     let array = read::<T>(name, given, kinds, dtype)?;
     let shape = array.shape().to_vec();
+    let expected = match *shape.as_slice() {
+        [_, _, 3] => "two axes, of grey levels (cv2.cvtColor makes them of colours)",
+        _ => "two axes",
+    };
     let two = array.cast::<PyArray2<T>>();
     Ok(two
-        .map_err(|_| axes(name, "two axes", &shape))?
+        .map_err(|_| axes(name, expected, &shape))?
         .try_readonly()?)
 }
 

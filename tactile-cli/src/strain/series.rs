@@ -1,11 +1,11 @@
 //! `tactile strain` of three frames and more: points are followed from frame to frame.
 use super::{
-    SERIES_FILES, StrainArguments, StrainReport, components_json, strain_cells, strain_headings,
+    Frame, SERIES_FILES, StrainArguments, StrainReport, components_json, strain_cells,
+    strain_headings,
 };
 use crate::console::Context;
 use crate::outputs::Csv;
-use crate::text::printable;
-use nalgebra::{Matrix3, Point};
+use nalgebra::Matrix3;
 use serde_json::{Value, json};
 use tactile_imaging::pipeline::with_error;
 use tactile_imaging::{SeriesStrain, StrainBetween, StrainSeries};
@@ -13,23 +13,23 @@ use tactile_imaging::{SeriesStrain, StrainBetween, StrainSeries};
 /// Follows the points and returns the strain of the last frame that has one since the first. None
 /// after Ctrl-C.
 pub(super) fn follow<const D: usize>(
-    frames: &[Vec<Point<f64, D>>],
+    frames: &[Frame<D>],
     unit: &'static str,
     arguments: &StrainArguments,
     context: &mut Context,
 ) -> Option<StrainReport<D>> {
-    let mut series = StrainSeries::new(&frames[0], arguments.options());
-    let mut report = SeriesReport::<D>::new();
+    let first = &frames[0];
+    let mut series = StrainSeries::new(&first.points, arguments.options());
+    let mut report = SeriesReport::<D>::new(first.number);
     // Frames of the series are those that were not refused.
-    let mut followed = vec![0];
+    let mut followed = vec![first];
     let mut measured = StrainReport {
-        before: frames[0].clone(),
+        before: first.points.clone(),
         ..StrainReport::new(unit, arguments)
     };
-    for (k, next) in frames.iter().enumerate().skip(1) {
-        let name = printable(&arguments.frames[k].display().to_string());
-        let job = format!("following {} points to {name}", next.len());
-        let points = next.clone();
+    for frame in &frames[1..] {
+        let points = frame.points.clone();
+        let job = format!("following {} points to {}", points.len(), frame.name);
         let found;
         (found, series) = context.wait(job, move || (series.push(&points), series))?;
         let total = found
@@ -37,22 +37,22 @@ pub(super) fn follow<const D: usize>(
             .map_or_else(Err, |found| found.total.as_ref());
         measured.complete &= total.is_ok();
         if found.is_ok() {
-            followed.push(k);
+            followed.push(frame);
         }
         if let Ok(total) = total {
-            measured.after.clone_from(next);
+            measured.after.clone_from(&frame.points);
             measured.strain = Ok(total.clone());
         }
-        report.add(k, &name, &found.map_err(|error| error.to_string()), context);
+        report.add(frame, &found.map_err(|error| error.to_string()), context);
     }
     let mut header = ["track", "frame", "row"].map(str::to_owned).to_vec();
     header.extend(measured.headings("", ""));
     let mut tracks = Csv::new(&header.join(","));
     for (track, places) in series.tracks().iter().enumerate() {
         for &(frame, row) in places {
-            let frame = followed[frame];
-            let place = frames[frame][row];
-            let cells = [track, frame + 1, row].map(|n| n as f64);
+            let Frame { number, points, .. } = followed[frame];
+            let place = points[row];
+            let cells = [track, *number, row].map(|n| n as f64);
             tracks.row(cells.into_iter().chain(place.iter().copied()));
         }
     }
@@ -66,18 +66,21 @@ pub(super) fn follow<const D: usize>(
 
 /// What is known of the frames.
 struct SeriesReport<const D: usize> {
+    /// The number of the first frame with points.
+    first: usize,
     table: Csv,
     frames: Vec<Value>,
 }
 
 impl<const D: usize> SeriesReport<D> {
-    fn new() -> Self {
+    fn new(first: usize) -> Self {
         let mut columns = vec!["frame".to_owned()];
         for part in ["step", "total"] {
             columns.push(format!("pairs_{part}"));
             columns.extend(strain_headings::<D>(&format!("_{part}")));
         }
         Self {
+            first,
             table: Csv::new(&columns.join(",")),
             frames: Vec::new(),
         }
@@ -85,8 +88,7 @@ impl<const D: usize> SeriesReport<D> {
 
     fn add(
         &mut self,
-        frame: usize,
-        file: &str,
+        Frame { number, name, .. }: &Frame<D>,
         found: &Result<SeriesStrain<D>, String>,
         context: &mut Context,
     ) {
@@ -97,9 +99,8 @@ impl<const D: usize> SeriesReport<D> {
             step.map_err(Clone::clone),
             total.as_ref().map_err(Clone::clone),
         ];
-        let frame = frame + 1; // the first frame is frame 1
-        let mut cells = vec![Some(frame as f64)];
-        let mut value = json!({ "frame": frame, "file": file });
+        let mut cells = vec![Some(*number as f64)];
+        let mut value = json!({ "frame": number, "file": name });
         for (name, part) in ["step", "total"].into_iter().zip(&parts) {
             match part {
                 Ok(strain) => {
@@ -124,12 +125,12 @@ impl<const D: usize> SeriesReport<D> {
             Ok(strain) => mean_text(strain),
             Err(reason) => format!("none: {reason}"),
         });
-        context.row(&format!("frame {frame}"), format_args!("step {}", text[0]));
-        context.row("", format_args!("since frame 1 {}", text[1]));
+        context.row(&format!("frame {number}"), format_args!("step {}", text[0]));
+        context.row("", format_args!("since frame {} {}", self.first, text[1]));
         for (name, part) in ["step", "total"].into_iter().zip(&parts) {
             if let Some(doubt) = part.as_ref().ok().and_then(|strain| strain.doubt) {
-                let place = json!({ "frame": frame, "strain": name });
-                let text = format_args!("frame {frame}, {name}: {doubt}");
+                let place = json!({ "frame": number, "strain": name });
+                let text = format_args!("frame {number}, {name}: {doubt}");
                 context.warn("doubtful_pairs", place, text);
             }
         }

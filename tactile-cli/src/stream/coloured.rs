@@ -3,7 +3,6 @@ use super::StreamArguments;
 use super::watch::{Meter, Watch, listed, watch};
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
-use crate::frames::Reading;
 use crate::photometric::{GelReading, NO_FRAMES, Reader, number_or_error};
 use crate::relief::HeightGrid;
 use ndarray::{Array2, Array3};
@@ -121,10 +120,7 @@ pub(super) fn coloured(
         report.inputs(frames.iter().cloned());
     }
     let reader = Reader::open(sensor)?;
-    let reading = Reading {
-        passes_over: true,
-        ..reader.reading(sensor)
-    };
+    let reading = reader.reading(sensor);
     let gel = Gel {
         reader,
         depth_m: Array2::default((0, 0)),

@@ -206,7 +206,7 @@ fn frames_without_colours_are_refused() {
     for (bytes, found) in [
         (
             &b"YUV4MPEG2 W2 H1 F25:1 Cmono\nFRAME\n\x0a\x14"[..],
-            "a video in luma and chroma",
+            "found luma and chroma",
         ),
         (b"P5\n2 1\n255\nab", "a grey one"),
         (b"P6\n2 1\n255\nabcdef", "has 1 rows and 2 columns"),

@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use tactile_files::io::{Grey, read_grey_image, write_grey_image};
+use tactile_files::io::{Grey, read_grey_image, write_colour_image, write_grey_image};
 
 /// The frames of the examples' press: without contact, at the lower and at the higher load.
 const REFERENCE: &str = "examples/data/press/reference.png";
@@ -50,6 +50,77 @@ fn a_swapped_reference_is_named_as_one() {
         error.contains("does not differ from the reference"),
         "{error}"
     );
+}
+
+/// What is left out, or differs in its colours from the reference, is named and ends nothing.
+#[test]
+fn frames_that_do_not_fit_the_others_are_named() {
+    let folder = folder_with_examples();
+    let tinted = |from: &str, to: &str, weights: [f64; 3]| {
+        let levels = read_grey_image(folder.path().join(from), Grey::default(), None).unwrap();
+        let levels = levels.levels.insert_axis(ndarray::Axis(2));
+        let shape = (levels.dim().0, levels.dim().1, 3);
+        let weights = ndarray::arr1(&weights);
+        let colours = &levels.broadcast(shape).unwrap() * &weights;
+        let colours = colours.mapv(|level| level.round().min(255.0) as u8);
+        write_colour_image(folder.path().join(to), colours.view()).unwrap();
+    };
+    tinted(REFERENCE, "blue.png", [0.4, 0.9, 1.4]);
+    tinted(LOWER, "blue_press.png", [0.4, 0.9, 1.4]);
+    tinted(LOWER, "red_press.png", [1.4, 0.9, 0.4]);
+    tinted(LOWER, "three.png", [1.0; 3]);
+    fs::write(folder.path().join("empty.png"), b"").unwrap();
+    for (reference, frames, code, says) in [
+        (
+            REFERENCE,
+            "blue_press.png",
+            0,
+            "blue_press.png is in colour",
+        ),
+        ("blue.png", LOWER, 0, "frame_1.png is grey"),
+        (
+            "blue.png",
+            "red_press.png",
+            0,
+            "red and blue of red_press.png",
+        ),
+        ("blue.png", "blue_press.png", 0, ""),
+        (REFERENCE, "three.png", 0, ""),
+        (
+            REFERENCE,
+            "empty.png examples/data/press/frame_1.png",
+            1,
+            "empty.png: expected",
+        ),
+        (
+            REFERENCE,
+            "examples/data/press/frame_1.png absent.png",
+            1,
+            "cannot read absent.png",
+        ),
+    ] {
+        let call = format!(
+            "force --reference {reference} --pairs examples/data/press/calibration.csv \
+             --pixel-um 40 --json {frames}"
+        );
+        let output = run(folder.path(), &words(&call));
+        assert_eq!(
+            output.status.code(),
+            Some(code),
+            "{call}: {}",
+            text(&output.stderr)
+        );
+        let value = value(&output);
+        assert_eq!(value["frames"].as_array().unwrap().len(), 1, "{call}");
+        let cautions = value["cautions"].as_array().unwrap().iter();
+        let kinds = ["colours_differ", "input_left_out"];
+        let named = cautions.filter(|c| kinds.iter().any(|kind| c["kind"] == *kind));
+        let named: Vec<_> = named.map(|c| c["text"].as_str().unwrap()).collect();
+        let fits = named
+            .first()
+            .map_or(says.is_empty(), |text| text.contains(says));
+        assert!(fits && named.len() < 2, "{call}: {named:?}");
+    }
 }
 
 #[test]

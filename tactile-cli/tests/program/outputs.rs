@@ -246,6 +246,31 @@ fn frames_of_a_series_give_tracks_and_strains() {
         let rows: String = seen.map(row).collect();
         fs::write(folder.path().join(format!("{frame}.csv")), rows).unwrap();
     }
+    // Frames that a tracker left empty keep their numbers, in files and in one table.
+    let put = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    put("none.csv", "x,y\n");
+    put("gap.csv", "nan,nan\n");
+    let frames = [Some("0.csv"), None, Some("1.csv"), Some("3.csv")];
+    let mut tracks = "frame,x,y\n".to_owned();
+    for (number, frame) in frames.iter().enumerate() {
+        let rows = fs::read_to_string(folder.path().join(frame.unwrap_or("gap.csv"))).unwrap();
+        rows.lines()
+            .for_each(|row| tracks += &format!("{number},{row}\n"));
+    }
+    put("tracks.csv", &tracks);
+    for call in ["strain 0.csv none.csv 1.csv 3.csv", "strain tracks.csv"] {
+        let output = run(folder.path(), &words(&format!("{call} --json")));
+        assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+        let value: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let caution = value["cautions"].as_array().unwrap().last().unwrap();
+        assert_eq!(
+            (&caution["kind"], &caution["frames"]),
+            (&"frames_empty".into(), &1.into())
+        );
+        assert_eq!(value["frames"][1]["frame"], 4);
+        let found = &value["frames"][1]["total"]["components"]["e_xx"]["value"];
+        assert!((found.as_f64().unwrap() - 0.5 * (1.15 * 1.15 - 1.0)).abs() < 1e-6);
+    }
     let call = "strain 0.csv 1.csv 2.csv 3.csv --json --out results";
     let value: Value = serde_json::from_str(&printed(folder.path(), call)).unwrap();
     for (frame, stretch) in [(1, 1.05), (2, 1.1), (3, 1.15_f64)] {

@@ -91,6 +91,14 @@ pub enum FileError {
         /// What is there, shortened if long.
         found: String,
     },
+    /// A table without a row that has its numbers, or a stream without a frame.
+    #[error("{}: expected at least one {of}, found none", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+        /// What it has none of.
+        of: &'static str,
+    },
     /// A place of the file holds a value, or names a file, that cannot be used.
     #[error("{}{place}: {source}", path.display())]
     Rejected {
@@ -124,6 +132,14 @@ impl FileError {
             place,
             expected: expected.into(),
             found: found.into(),
+        }
+    }
+
+    /// A table without rows.
+    pub(super) fn no_rows(path: &Path) -> Self {
+        Self::Empty {
+            path: path.into(),
+            of: "row of numbers",
         }
     }
 

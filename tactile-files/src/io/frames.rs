@@ -20,7 +20,7 @@ use tactile_imaging::pipeline::FrameSource;
 
 /// Longest line of a video's header and longest header of an image, in bytes. Longer ones are no
 /// video, and a line without an end would fill the memory.
-const LONGEST_HEADER: u64 = 4096;
+pub(super) const LONGEST_HEADER: u64 = 4096;
 
 pub(crate) use self::npy::{header_fields, members};
 
@@ -93,6 +93,7 @@ pub struct FrameReader {
     first_error: Option<FileError>,
     /// Rows and columns of the first frame, which the others have too.
     size: Option<(usize, usize)>,
+    colour: Option<[f64; 3]>,
     default_rate_hz: f64,
 }
 
@@ -220,6 +221,7 @@ impl FrameReader {
             passed_over: Vec::new(),
             first_error: None,
             size: None,
+            colour: None,
             default_rate_hz: frame_rate_hz,
         })
     }
@@ -241,6 +243,13 @@ impl FrameReader {
     /// The frame rate that the stream itself states.
     pub fn frame_rate_hz(&self) -> Option<f64> {
         self.decoder.as_ref()?.rate_hz()
+    }
+
+    /// Mean red, green and blue of the last frame that was read as a grey one. `None` for one that is
+    /// stored as grey.
+    #[must_use]
+    pub fn colour(&self) -> Option<[f64; 3]> {
+        self.colour
     }
 
     /// Number of frames so far, those that were dropped or damaged included.
@@ -289,13 +298,15 @@ impl FrameReader {
         let convert = |encoded: Encoded, name: &Path| {
             let image = match encoded {
                 Encoded::Luma { .. } | Encoded::DeepLuma(_) => {
-                    return Err(colours("a video in luma and chroma"));
+                    return Err(colours(
+                        "luma and chroma: ffmpeg writes colours by -c:v ppm",
+                    ));
                 }
                 Encoded::Page(bytes) => decode(&bytes, name)?,
                 Encoded::File(bytes) => decode(&bytes, name)?,
                 Encoded::Decoded(image) => image,
             };
-            colour_levels(image).ok_or_else(|| colours("a grey one"))
+            colour_levels(image).ok_or_else(|| colours("a grey one: record it in colour"))
         };
         let size = |frame: &Array3<u8>| (frame.dim().0, frame.dim().1);
         let next = self.next_of(Vec::new(), convert, size)?;
@@ -344,12 +355,17 @@ impl FrameReader {
                     self.first_error.get_or_insert(error);
                 }
                 ended => {
-                    // A stream of damaged frames alone has no frame.
-                    let error = self.first_error.take().filter(|_| self.size.is_none());
                     self.decoder = None;
-                    return match error {
-                        Some(error) => Err(error),
-                        None => ended.map(|_| None),
+                    let empty = || FileError::Empty {
+                        path: name.clone(),
+                        of: "frame",
+                    };
+                    return match ended {
+                        // A stream of damaged frames alone has no frame.
+                        Ok(_) if self.size.is_none() => {
+                            Err(self.first_error.take().unwrap_or_else(empty))
+                        }
+                        ended => ended.map(|_| None),
                     };
                 }
             }
@@ -404,13 +420,14 @@ impl FrameSource for FrameReader {
                 }
                 Encoded::Decoded(image) => eight_bit_levels(image, &[], name, grey, bits)?,
                 Encoded::Luma { size, samples } => {
-                    Array2::from_shape_vec(size, samples).unwrap_or_else(|_| Array2::zeros(size))
+                    let levels = Array2::from_shape_vec(size, samples);
+                    (levels.unwrap_or_else(|_| Array2::zeros(size)), None)
                 }
             })
         };
-        let next = self.next_of(memory, convert, Array2::dim)?;
+        let next = self.next_of(memory, convert, |(levels, _)| levels.dim())?;
         Ok(next.map(|(time_s, next)| {
-            *frame = next;
+            (*frame, self.colour) = next;
             time_s
         }))
     }

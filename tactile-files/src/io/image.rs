@@ -1,11 +1,19 @@
 //! Grey images from PNG, PGM, JPEG and TIFF files.
 use super::error::FileError;
 use super::files::{read_bytes, write_bytes};
+use super::frames::LONGEST_HEADER;
 use super::kinds::kind_of;
 use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
 use std::io::Cursor;
 use std::path::Path;
+
+/// Grey levels by which red, green and blue of a pixel differ if it is in colour: more than a codec
+/// rounds. A sensor without contact is nearly black, so that its colours differ by few.
+const LEAST_TINT: f64 = 1.0;
+
+/// Share of such pixels in an image that is in colour. A stamp of the time has fewer.
+const TINTED_SHARE: f64 = 1e-3;
 
 /// How red, green and blue make a grey level, on the stored (gamma-coded) values.
 ///
@@ -54,7 +62,7 @@ impl Grey {
 /// let path = folder.path().join("red_and_grey.ppm");
 /// std::fs::write(&path, b"P6\n2 1\n255\n\xff\x00\x00\x0a\x0a\x0a")?;
 /// let image = read_grey_image(&path, Grey::Rec601, None)?;
-/// assert!(image.colour && image.bits == 8);
+/// assert_eq!((image.colour, image.bits), (Some([132.5, 5.0, 5.0]), 8));
 /// assert!((image.levels[[0, 0]] - 0.299 * 255.0).abs() < 1e-12);
 /// assert_eq!(image.to_u8(), ndarray::array![[76, 10]]);
 /// # Ok(()) }
@@ -65,8 +73,9 @@ pub struct GreyImage {
     pub levels: Array2<f64>,
     /// Bits of a sample in the file: 8 or 16.
     pub bits: u8,
-    /// Whether the file was in colour.
-    pub colour: bool,
+    /// Mean red, green and blue. `None` for a grey image, also for one that is stored in three
+    /// channels.
+    pub colour: Option<[f64; 3]>,
 }
 
 impl GreyImage {
@@ -138,12 +147,15 @@ pub fn read_grey_image(
 /// ```
 #[must_use]
 pub fn image_size(path: impl AsRef<Path>) -> Option<(usize, usize)> {
-    let path = path.as_ref();
+    let (width, height) = header(path.as_ref())?.dimensions();
+    Some((height as usize, width as usize))
+}
+
+fn header(path: &Path) -> Option<impl ImageDecoder + use<>> {
     // Opening a pipe without a writer would wait for ever.
     path.metadata().ok().filter(std::fs::Metadata::is_file)?;
     let reader = ImageReader::open(path).ok()?.with_guessed_format().ok()?;
-    let (width, height) = reader.into_dimensions().ok()?;
-    Some((height as usize, width as usize))
+    reader.into_decoder().ok()
 }
 
 /// Reads a grey image in eight bits a pixel, as [`GreyImage::to_u8`] gives it.
@@ -152,26 +164,41 @@ pub fn image_size(path: impl AsRef<Path>) -> Option<(usize, usize)> {
 /// As [`read_grey_image`].
 pub fn read_grey_levels(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, FileError> {
     let bytes = read_bytes(path)?;
-    eight_bit_levels(decode(&bytes, path)?, &bytes, path, Grey::default(), bits)
+    let image = eight_bit_levels(decode(&bytes, path)?, &bytes, path, Grey::default(), bits)?;
+    Ok(image.0)
+}
+
+/// Mean red, green and blue of an image file, as [`GreyImage::colour`]. A grey one is not decoded.
+///
+/// # Errors
+/// As [`read_grey_image`].
+pub fn image_colour(path: &Path) -> Result<Option<[f64; 3]>, FileError> {
+    match header(path) {
+        Some(header) if !header.color_type().has_color() => Ok(None),
+        _ => Ok(read_grey_image(path, Grey::default(), Some(16))?.colour),
+    }
 }
 
 /// The levels of an image, whose encoded `bytes` may state the largest sample, in eight bits a
-/// pixel.
+/// pixel, and its colour.
 pub(super) fn eight_bit_levels(
     image: DynamicImage,
     bytes: &[u8],
     path: &Path,
     grey: Grey,
     bits: Option<u8>,
-) -> Result<Array2<u8>, FileError> {
+) -> Result<(Array2<u8>, Option<[f64; 3]>), FileError> {
     match image {
         // Samples that are grey levels already are taken as they stand.
         DynamicImage::ImageLuma8(image) => {
             let shape = (image.height() as usize, image.width() as usize);
             let levels = Array2::from_shape_vec(shape, image.into_raw());
-            Ok(levels.unwrap_or_else(|_| Array2::zeros(shape)))
+            Ok((levels.unwrap_or_else(|_| Array2::zeros(shape)), None))
         }
-        image => Ok(to_grey(image, bytes, path, grey, bits)?.to_u8()),
+        image => {
+            let image = to_grey(image, bytes, path, grey, bits)?;
+            Ok((image.to_u8(), image.colour))
+        }
     }
 }
 
@@ -203,7 +230,7 @@ pub fn read_colour_levels(path: impl AsRef<Path>) -> Result<Array3<u8>, FileErro
 /// Samples of 16 bits that do not exceed 10 or 12 bits are those of such a camera: they are divided
 /// by its range, not by that of 16 bits.
 pub(super) fn colour_levels(image: DynamicImage) -> Option<Array3<u8>> {
-    if !image.color().has_color() {
+    if !image.color().has_color() || is_grey_in_three(&image) {
         return None;
     }
     if let DynamicImage::ImageRgb16(_) | DynamicImage::ImageRgba16(_) = image {
@@ -220,6 +247,16 @@ pub(super) fn colour_levels(image: DynamicImage) -> Option<Array3<u8>> {
     let image = image.into_rgb8();
     let shape = (image.height() as usize, image.width() as usize, 3);
     Array3::from_shape_vec(shape, image.into_raw()).ok()
+}
+
+/// Whether a grey image was saved in three equal channels. One of a single colour shows nothing.
+fn is_grey_in_three(image: &DynamicImage) -> bool {
+    let DynamicImage::ImageRgb8(image) = image else {
+        return false;
+    };
+    let pixels = image.as_chunks::<3>().0;
+    let is_grey = pixels.iter().all(|[r, g, b]| r == g && g == b);
+    is_grey && pixels.iter().any(|pixel| *pixel != pixels[0])
 }
 
 /// Reads the image that a field of `file` names. It has to have the size of the reference, where
@@ -253,11 +290,17 @@ pub(super) fn largest_image() -> (u32, u64) {
 
 pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileError> {
     if !::image::guess_format(bytes).is_ok_and(|format| format.reading_enabled()) {
-        let kind = kind_of(bytes).unwrap_or("a text");
+        let text = if bytes.is_empty() { "empty" } else { "a text" };
+        let kind = kind_of(bytes).unwrap_or(text);
         return Err(refused(path, format!("it is {kind}: an image is wanted")));
     }
     if is_cut_jpeg(bytes) {
-        return Err(refused(path, CUT_JPEG));
+        return Err(refused(path, DAMAGED));
+    }
+    // Before its samples an animated PNG announces its frames.
+    let start = &bytes[..bytes.len().min(LONGEST_HEADER as usize)];
+    if start.starts_with(b"\x89PNG") && start.windows(4).any(|chunk| chunk == b"acTL") {
+        return Err(refused(path, "it is an animation: save its frames as PNG"));
     }
     let (side, pixels) = largest_image();
     let mut limits = Limits::default();
@@ -294,7 +337,7 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileErro
     decoded.map_err(|reason| refused(path, reason))
 }
 
-const CUT_JPEG: &str = "the JPEG image is damaged or cut short";
+const DAMAGED: &str = "the image is damaged or cut short";
 
 /// Whether the samples of a JPEG image have no end: a decoder makes up the rest.
 fn is_cut_jpeg(bytes: &[u8]) -> bool {
@@ -307,25 +350,13 @@ fn is_cut_jpeg(bytes: &[u8]) -> bool {
 const OTHER_SAMPLES: &str = "it is stored in a way that is not read: save it with whole numbers of 8 or 16 \
      bits without sign, packed by LZW, Deflate or not at all";
 
-/// A decoder's error on one line. That of portable anymaps prints `Some(3)` and `None`.
+/// A codec's error in words of this reader.
 fn in_words(error: &ImageError) -> String {
-    if let ImageError::Unsupported(_) = error {
-        return OTHER_SAMPLES.into();
+    match error {
+        ImageError::Unsupported(_) => OTHER_SAMPLES.into(),
+        ImageError::Decoding(_) | ImageError::IoError(_) => DAMAGED.into(),
+        other => other.to_string(),
     }
-    let mut text = error.to_string();
-    if text.contains("decoding Jpeg") {
-        return CUT_JPEG.into();
-    }
-    while let Some(start) = text.find("Some(") {
-        let inner = start + "Some(".len();
-        let Some(length) = text[inner..].find(')') else {
-            break;
-        };
-        text.replace_range(inner + length..=inner + length, "");
-        text.replace_range(start..inner, "");
-    }
-    let text = text.replace("None", "missing");
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 pub(super) fn refused(path: &Path, reason: impl Into<String>) -> FileError {
@@ -360,23 +391,30 @@ fn to_grey(
     let scale = white.map_err(|reason| refused(path, reason))? / 255.0;
     // Where the caller gives the bits, the decoder's rounding can pass the largest level.
     let level = |sample: u16| f64::from(sample) / scale;
-    let levels = if colour.has_color() {
+    let (mut sums, mut tinted) = ([0; 3], 0);
+    let levels: Vec<f64> = if colour.has_color() {
         let weights = grey.weights();
-        let pixels = samples.chunks_exact(3);
-        let weighted = pixels.map(|rgb| (0..3).map(|i| weights[i] * level(rgb[i])));
-        weighted
-            .map(|terms| terms.sum::<f64>().min(255.0))
-            .collect()
+        let least = (LEAST_TINT * scale) as u16;
+        let weighted = samples.as_chunks::<3>().0.iter().map(|rgb| {
+            let [r, g, b] = *rgb;
+            tinted += usize::from(r.max(g).max(b) - r.min(g).min(b) > least);
+            (0..3).for_each(|i| sums[i] += u64::from(rgb[i]));
+            let terms = (0..3).map(|i| weights[i] * level(rgb[i]));
+            terms.sum::<f64>().min(255.0)
+        });
+        weighted.collect()
     } else {
         samples
             .iter()
             .map(|sample| level(*sample).min(255.0))
             .collect()
     };
+    let pixels = levels.len() as f64;
+    let means = sums.map(|sum| sum as f64 / (scale * pixels));
     Ok(GreyImage {
         levels: Array2::from_shape_vec(shape, levels).unwrap_or_else(|_| Array2::zeros(shape)),
         bits: if is_wide { 16 } else { 8 },
-        colour: colour.has_color(),
+        colour: (tinted as f64 > TINTED_SHARE * pixels).then_some(means),
     })
 }
 

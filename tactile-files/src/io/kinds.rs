@@ -50,7 +50,7 @@ const KINDS: [(usize, &[u8], &str); 25] = [
         b"\x89HDF",
         "an HDF5 file: export CSV, or save .mat by `save -v7`",
     ),
-    (0, b"MATLAB 5.0", "a .mat file of version 5"),
+    (0, b"MATLAB 5.0", "a .mat file: numpy.save writes frames"),
     (0, b"%PDF", "a PDF"),
     (0, b"\x1f\x8b", "a file packed by gzip: unpack it"),
 ];
@@ -59,12 +59,10 @@ const MPEG: &str = "a compressed video, which is not read: pipe it by \
                     ffmpeg -i VIDEO -f yuv4mpegpipe -pix_fmt gray - | tactile … -";
 
 /// What begins a text that is no table, and what such a text is, with the remedy.
-const TEXTS: [(&str, &str); 7] = [
+const TEXTS: [(&str, &str); 5] = [
     ("P2\n", "a PGM image"),
     ("P3\n", "a PPM image"),
     ("{", "a JSON text: export it as CSV"),
-    ("[[", "a JSON text: export it as CSV"),
-    ("[{", "a JSON text: export it as CSV"),
     ("<", "an HTML or XML text: export it as CSV"),
     (
         "version https://git-lfs",
@@ -75,6 +73,12 @@ const TEXTS: [(&str, &str); 7] = [
 /// What a text is that is no table. `None` for one that may be.
 pub(super) fn kind_of_text(bytes: &[u8]) -> Option<&'static str> {
     let text = bytes.trim_ascii_start();
+    // A preamble may have names in brackets.
+    let list = text.strip_prefix(b"[").map(<[u8]>::trim_ascii_start);
+    let is_json = list.is_some_and(|rest| {
+        rest.starts_with(b"[") || rest.first().is_some_and(|c| b"{\"-0123456789".contains(c))
+    });
+    let text = if is_json { b"{" } else { text };
     let mut texts = TEXTS.iter();
     let (_, kind) = texts.find(|(start, _)| text.starts_with(start.as_bytes()))?;
     Some(kind)

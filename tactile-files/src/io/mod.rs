@@ -41,8 +41,8 @@ pub use error::{FileError, FilePlace};
 pub use files::{read_bytes, replace_file, write_bytes};
 pub use frames::{FrameReader, frame_formats};
 pub use image::{
-    Grey, GreyImage, image_size, read_colour_levels, read_grey_image, read_grey_levels,
-    write_colour_image, write_grey_image,
+    Grey, GreyImage, image_colour, image_size, read_colour_levels, read_grey_image,
+    read_grey_levels, write_colour_image, write_grey_image,
 };
 pub use normals::read_normal_map;
 pub use range::InputQuantity;

@@ -67,7 +67,7 @@ fn array(name: &str, shape: &[usize], by_columns: bool, values: Vec<f64>) -> Opt
     let length = shape
         .iter()
         .try_fold(1_usize, |all, side| all.checked_mul(*side))?;
-    if length != values.len() || values.is_empty() {
+    if length != values.len() {
         return None;
     }
     let values = match by_columns {
@@ -164,8 +164,9 @@ fn matrix(mut rest: &[u8], big_endian: bool) -> Option<Array> {
     } else {
         flags.first()
     };
-    // Cells, structures, objects, text and sparse matrices are no tables.
-    if !(6..=15).contains(class?) {
+    // Cells, structures, objects, text, sparse matrices and complex numbers are no tables.
+    let complex = flags.get(if big_endian { 2 } else { 1 })? & 8 != 0;
+    if complex || !(6..=15).contains(class?) {
         return None;
     }
     let (_, sides) = element(&mut rest, big_endian)?;
@@ -235,10 +236,12 @@ pub(super) fn cells(bytes: &[u8], path: &Path) -> Option<Result<TextCells, FileE
         [] if bytes.starts_with(ARRAY_STARTS[0]) => {
             let header = String::from_utf8_lossy(&bytes[..bytes.len().min(140)]);
             let from = header.find('{').unwrap_or(0);
-            let found = format!(
-                "`{}`: save it by `astype(float)`",
-                quoted(&header[from..], 70)
-            );
+            // An array of records has a list of its columns.
+            let remedy = match header.contains("'descr': [") {
+                true => "save its columns by numpy.savez",
+                false => "save it by `astype(float)`",
+            };
+            let found = format!("`{}`: {remedy}", quoted(&header[from..], 70));
             return Some(Err(refused(found)));
         }
         [] => {
@@ -285,6 +288,7 @@ pub(super) fn cells(bytes: &[u8], path: &Path) -> Option<Result<TextCells, FileE
 pub(super) fn vectors(bytes: &[u8], path: &Path) -> Option<Result<Array3<f64>, FileError>> {
     let found = arrays(bytes)?
         .into_iter()
+        .filter(|array| !array.values.is_empty())
         .find_map(|array| match *array.shape {
             [rows, columns, 3] => Array3::from_shape_vec((rows, columns, 3), array.values).ok(),
             [3, rows, columns] => {
@@ -294,5 +298,12 @@ pub(super) fn vectors(bytes: &[u8], path: &Path) -> Option<Result<Array3<f64>, F
             _ => None,
         });
     let expected = "an array of normals of shape (rows, columns, 3)";
-    Some(found.ok_or_else(|| FileError::content(path, FilePlace::File, expected, "none")))
+    Some(found.ok_or_else(|| {
+        FileError::content(
+            path,
+            FilePlace::File,
+            expected,
+            "none: slopes are two files",
+        )
+    }))
 }

@@ -187,8 +187,7 @@ impl Table {
         self.rows = (0..self.values.nrows()).filter(whole).collect();
         let (left, all) = (self.values.nrows() - self.rows.len(), self.values.nrows());
         if self.rows.is_empty() {
-            let expected = "at least one row with a number in each column".into();
-            return Err(self.error(FilePlace::File, expected, "none".into()));
+            return Err(FileError::no_rows(&self.path));
         }
         if left > 0 {
             let note = format!(
@@ -296,8 +295,7 @@ pub fn read_table_with(path: impl AsRef<Path>, options: &TableOptions) -> Result
         path: path.into(),
     };
     if table.values.is_empty() {
-        let expected = "at least one row of numbers".into();
-        return Err(table.error(FilePlace::File, expected, "none".into()));
+        return Err(FileError::no_rows(path));
     }
     Ok(table)
 }
@@ -374,25 +372,32 @@ impl Points {
         if self.table_rows != other.table_rows || self.rows == other.rows {
             return;
         }
-        let [own, others] = [&*self, &*other].map(|points| points.rows.clone());
-        self.keep(|row| others.binary_search(&row).is_ok());
-        other.keep(|row| own.binary_search(&row).is_ok());
+        let shared = |of: &Self, with: &Self| {
+            let is_shared = |k: &usize| with.rows.binary_search(&of.rows[*k]).is_ok();
+            of.only(&(0..of.rows.len()).filter(is_shared).collect::<Vec<_>>())
+        };
+        (*self, *other) = (shared(self, other), shared(other, self));
     }
 
-    fn keep(&mut self, is_kept: impl Fn(usize) -> bool) {
-        let rows = std::mem::take(&mut self.rows);
-        let kept: Vec<usize> = (0..rows.len()).filter(|k| is_kept(rows[*k])).collect();
+    /// The points at these positions.
+    fn only(&self, kept: &[usize]) -> Self {
         let of = |points: &PointTable| match points {
             PointTable::Plane(all) => PointTable::Plane(kept.iter().map(|k| all[*k]).collect()),
             PointTable::Space(all) => PointTable::Space(kept.iter().map(|k| all[*k]).collect()),
         };
-        (self.points, self.displaced) = (of(&self.points), self.displaced.as_ref().map(of));
-        self.rows = kept.iter().map(|k| rows[*k]).collect();
+        Self {
+            points: of(&self.points),
+            displaced: self.displaced.as_ref().map(of),
+            rows: kept.iter().map(|k| self.rows[*k]).collect(),
+            notes: self.notes.clone(),
+            ..*self
+        }
     }
 }
 
 /// Reads points with two or three coordinates, as many as the file has. A table of tracked points
-/// with a column of frames gives the points of each frame, in ascending order.
+/// with a column of frames gives the points of each frame, in ascending order, none for a frame
+/// whose rows have no numbers.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -420,19 +425,21 @@ pub fn read_point_frames(
     let Some(frame) = frame.filter(|_| !axes(&headings).is_empty()) else {
         return Ok(vec![whole]);
     };
-    let numbers = table.rows.iter().map(|row| table.values[[*row, frame]]);
-    let mut distinct: Vec<f64> = numbers.collect();
+    let mut distinct = table.values.column(frame).to_vec();
+    distinct.retain(|number| !number.is_nan());
     distinct.sort_by(f64::total_cmp);
     distinct.dedup();
     if distinct.len() < 2 {
         return Ok(vec![whole]);
     }
-    let of_frame = |number: &f64| {
-        let mut points = whole.clone();
-        points.keep(|row| table.values[[row, frame]].total_cmp(number).is_eq());
-        points
-    };
-    Ok(distinct.iter().map(of_frame).collect())
+    let mut frames = vec![Vec::new(); distinct.len()];
+    for (k, row) in whole.rows.iter().enumerate() {
+        let number = table.values[[*row, frame]];
+        if let Ok(at) = distinct.binary_search_by(|other| other.total_cmp(&number)) {
+            frames[at].push(k);
+        }
+    }
+    Ok(frames.iter().map(|kept| whole.only(kept)).collect())
 }
 
 /// Reads points and where they go: columns `x`, `y` and, in space, `z` with the displacements `u`,

@@ -164,7 +164,7 @@ fn pnm(header: &str, samples: &[u8]) -> GreyImage {
 #[test]
 fn colour_is_rec_601() {
     let image = pnm("P6\n3 1\n255\n", &[255, 0, 0, 0, 255, 0, 0, 0, 255]);
-    assert!(image.colour && image.bits == 8);
+    assert_eq!((image.colour, image.bits), (Some([85.0; 3]), 8));
     // 255 times the weights, to rounding.
     for (level, weight) in image.levels.iter().zip(Grey::Rec601.weights()) {
         assert!((level - 255.0 * weight).abs() < 1e-12);
@@ -175,7 +175,7 @@ fn colour_is_rec_601() {
 #[test]
 fn sixteen_bits_keep_their_fraction() {
     let image = pnm("P5\n2 1\n65535\n", &[0x01, 0x00, 0xff, 0xff]);
-    assert_eq!((image.bits, image.colour), (16, false));
+    assert_eq!((image.bits, image.colour), (16, None));
     assert_eq!(image.levels.as_slice().unwrap(), [256.0 / 257.0, 255.0]);
 }
 
@@ -428,6 +428,10 @@ fn tables_of_other_programs_are_read() {
         "*** DICe\nid,Pos. X [px],Pos. Y [px]\n1,1.5,2\n2,3,4\n",
         "label,row,col\n1,2,1.5\n2,4,3\n",
         "x/px,y/px\n1.5,2\n3,4\n",
+        // Groups of columns above their names, and errors of a spreadsheet in place of a number.
+        "scorer,net,net,net\nparts,dot,dot,dot\ncoords,x,y,score\n0,1.5,2,1\n1,3,4,1\n",
+        "a,a\nx,y\n1.5,2\n3,4\n",
+        "x,y\n1.5,2\n#DIV/0!,3\n3,4\n",
     ] {
         let file = file(text);
         let frames = read_point_frames(&file.path, &TableOptions::default()).unwrap();
@@ -490,6 +494,9 @@ fn arrays_of_numbers_are_tables() {
     mat.extend(element(14, &parts.concat()));
     assert_eq!(read(&mat).unwrap(), ndarray::array![[7.0], [9.0]]);
     assert!(sentence(read(&mat[..150])).contains("one array of numbers"));
+    // The same marked as complex: its second part would be lost.
+    mat[128 + 8 + 8 + 1] = 8;
+    assert!(sentence(read(&mat)).contains("save arrays of numbers"));
 }
 
 #[test]
@@ -498,7 +505,8 @@ fn what_is_no_table_is_named_with_its_remedy() {
         (&b"\x89PNG\r\n\x1a\n"[..], "found a PNG image"),
         (b"\x89HDF\r\n\x1a\n", "save .mat by `save -v7`"),
         (&[7, 0, 1, 2], "a binary file of an unknown kind"),
-        (b"[[1, 2], [3, 4]]", "a JSON text: export it as CSV"),
+        (b"[\n [1, 2], [3, 4]]", "a JSON text: export it as CSV"),
+        (b"x;y\n1,234;2.5\n", "`1,234` beside decimal points"),
         (b"version https://git-lfs.github.com", "git lfs pull"),
         (
             b"Gauge: A\nGain 5\ndepth,force\n1,2\n3,4\n",
@@ -672,6 +680,15 @@ fn what_is_no_stream_is_refused_in_a_sentence() {
         3,
         "frame 4: expected the word FRAME, found `garbage`",
     );
+    let pam = b"P7\nWIDTH 2\nHEIGHT 1\nDEPTH 1\nMAXVAL 255\nENDHDR\nab";
+    breaks_off(&pam.repeat(2), 0, "several: write binary PGM or PPM");
+    breaks_off(b"--frame\r\n\r\n", 0, "at least one frame, found none");
+    let animated = b"\x89PNG\r\n\x1a\n\0\0\0\x08acTL\0\0\0\x02\0\0\0\0\0\0\0\0";
+    breaks_off(animated, 0, "it is an animation");
+    // ImageJ states the frames of a large stack behind one directory.
+    let mut stack = pages(true);
+    stack.extend(b"ImageJ=1.53\nimages=9\n");
+    breaks_off(&stack, 3, "expected 9 pages, as ImageJ states, found 3");
     let mut endless = pages(true);
     let last = endless.len() - 4;
     endless[last..].copy_from_slice(&23_u32.to_le_bytes());

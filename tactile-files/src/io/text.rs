@@ -1,5 +1,5 @@
 //! Tables in text: what separates their cells, where their heading stands, and their numbers.
-use super::columns::{Heading, in_si};
+use super::columns::{Heading, axes, in_si};
 use super::error::{FileError, FilePlace, quoted};
 use super::kinds::{UTF_16, kind_of, kind_of_text};
 use std::borrow::Cow;
@@ -14,9 +14,12 @@ const MOST_FURTHER_HEADINGS: usize = 3;
 /// Rows that show whether a program writes every number with its decimals.
 const ROWS_LOOKED_AT: usize = 20;
 
-/// Words for a number that is not there: of pandas, R, spreadsheets, Labview and Windows.
-const MISSING: [&str; 9] = [
-    "", "na", "n/a", "#n/a", "null", "none", "-", "1.#qnan", "-1.#ind",
+/// Words for a number that is not there: of pandas, R, Labview and Windows.
+const MISSING: [&str; 8] = ["", "na", "n/a", "null", "none", "-", "1.#qnan", "-1.#ind"];
+
+/// What spreadsheets write into such a cell. Comments begin with the same sign.
+const SHEET_ERRORS: [&str; 7] = [
+    "#n/a", "#div/0!", "#num!", "#value!", "#ref!", "#null!", "#name?",
 ];
 
 /// What lines of comments begin with: numpy, MATLAB, C, DICe.
@@ -70,7 +73,11 @@ impl<'a> Lines<'a> {
 
 fn is_comment(line: &str) -> bool {
     let line = line.trim_start();
-    COMMENTS.iter().any(|sign| line.starts_with(sign))
+    let begins = |word: &str| {
+        let start = line.get(..word.len());
+        start.is_some_and(|start| start.eq_ignore_ascii_case(word))
+    };
+    COMMENTS.iter().any(|sign| line.starts_with(sign)) && !SHEET_ERRORS.into_iter().any(begins)
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -151,7 +158,7 @@ fn parse(cell: &str) -> Option<f64> {
 fn number(cell: &str, comma: bool) -> Option<f64> {
     let with_point = || parse(&cell.replacen(',', ".", 1)).filter(|_| comma);
     let missing = || {
-        let mut words = MISSING.iter();
+        let mut words = MISSING.iter().chain(&SHEET_ERRORS);
         let is_missing = words.any(|word| word.eq_ignore_ascii_case(cell));
         is_missing.then_some(f64::NAN)
     };
@@ -309,7 +316,7 @@ fn decoded<'a>(bytes: &'a [u8], path: &Path, skip_lines: usize) -> Result<Cow<'a
 pub(super) fn cells(bytes: &[u8], path: &Path, skip_lines: usize) -> Result<TextCells, FileError> {
     let text = decoded(bytes, path, skip_lines)?;
     let lines = Lines::new(&text, skip_lines);
-    let none = || FileError::content(path, FilePlace::File, "at least one row of numbers", "none");
+    let none = || FileError::no_rows(path);
     let (first, first_line) = lines.content().next().ok_or_else(none)?;
     let mut layout = Layout::of(&lines, first_line);
     let ragged = |layout: &Layout, line: u64, found: usize| {
@@ -361,20 +368,28 @@ pub(super) fn cells(bytes: &[u8], path: &Path, skip_lines: usize) -> Result<Text
     }
     (table.columns, table.missing) = (layout.columns, vec![None; layout.columns]);
     table.words = vec![None; layout.columns];
-    let (mut further, mut commas) = (0, false);
+    let (mut further, mut commas, mut points) = (0, false, false);
+    let mut thousands = None;
     for (line, text) in rows {
         layout.split(text, &mut cells);
         if cells.len() != layout.columns {
             return Err(ragged(&layout, line, cells.len()));
         }
         let above = table.values.is_empty() && further < MOST_FURTHER_HEADINGS;
-        if above && layout.is_heading(&cells) && table.further_heading(&cells, further > 0) {
+        if above && layout.is_heading(&cells) && table.further_heading(line, &cells, further > 0) {
             further += 1;
             continue;
         }
         for (column, cell) in cells.iter().enumerate() {
             let value = number(cell, layout.comma);
-            commas |= layout.comma && value.is_some() && cell.contains(',');
+            if layout.comma && value.is_some() {
+                points |= cell.contains('.');
+                if let Some((whole, rest)) = cell.split_once(',') {
+                    commas = true;
+                    let is_group = whole.len() < 4 && rest.len() == 3;
+                    thousands = thousands.or(is_group.then_some((line, column, *cell)));
+                }
+            }
             match value {
                 None if table.words[column].is_none() => {
                     table.words[column] = Some((line, quoted(cell, 40)));
@@ -386,6 +401,19 @@ pub(super) fn cells(bytes: &[u8], path: &Path, skip_lines: usize) -> Result<Text
             }
             table.values.push(value.unwrap_or(f64::NAN));
         }
+    }
+    if let Some((line, column, cell)) = thousands.filter(|_| points) {
+        let place = FilePlace::Cell {
+            line,
+            column: column + 1,
+        };
+        let found = format!("`{cell}` beside decimal points");
+        return Err(FileError::content(
+            path,
+            place,
+            "a decimal comma or a thousands separator alone",
+            found,
+        ));
     }
     if commas {
         table.notes.push("its decimal points are commas".into());
@@ -436,9 +464,18 @@ impl TextCells {
         Ok(())
     }
 
-    /// Takes a line of words below the heading for units or longer names. False for words in place
-    /// of numbers.
-    fn further_heading(&mut self, cells: &[&str], below_others: bool) -> bool {
+    /// Takes a line of words below the heading for units, longer names, or the names of columns whose
+    /// groups stand above (pandas, DeepLabCut). False for words in place of numbers.
+    fn further_heading(&mut self, line: u64, cells: &[&str], below_others: bool) -> bool {
+        let has_axes = |names: &mut dyn Iterator<Item = &str>| {
+            axes(&names.map(Heading::of).collect::<Vec<_>>()).len() > 1
+        };
+        let is_named = has_axes(&mut self.header.iter().map(String::as_str));
+        if !self.header.is_empty() && !is_named && has_axes(&mut cells.iter().copied()) {
+            self.header = cells.iter().map(|cell| quoted(cell, 40)).collect();
+            self.notes.push(format!("the heading is line {line}"));
+            return true;
+        }
         let bare = |cell: &str| cell.trim_matches(['(', ')', '[', ']']).trim().to_owned();
         let is_unit = |cell: &&str| cell.is_empty() || in_si(&bare(cell)).is_some();
         let units = cells.iter().all(is_unit);

@@ -12,9 +12,9 @@ use std::path::Path;
 /// Places where a file stands that must be an image, `@` for the file.
 const IMAGES: [&str; 5] = [
     "force --reference @ --pairs calibration.csv --pixel-um 40 frame_1.png",
-    "force --reference reference.png --pairs calibration.csv --pixel-um 40 frame_1.png @",
+    "force --reference reference.png --pairs calibration.csv --pixel-um 40 @",
     "depth --reference @ --table depth_table.csv --pixel-um 100 dark_frame.pgm",
-    "depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 dark_frame.pgm @",
+    "depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 @",
     "integrate slope_x.csv slope_y.csv --mask @",
 ];
 

@@ -9,7 +9,8 @@ const STARTS: [&[u8]; 2] = [b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"];
 
 pub(super) const FORMAT: Format = Format {
     name: "PNG, JPEG",
-    begins: |start| STARTS.iter().any(|image| start.starts_with(image)),
+    // Cameras in a network separate images by lines that begin so.
+    begins: |start| start.starts_with(b"--") || STARTS.iter().any(|image| start.starts_with(image)),
     open: |_| Ok(Box::new(Images::default())),
 };
 

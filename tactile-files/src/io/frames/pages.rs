@@ -1,7 +1,7 @@
 //! TIFF files, a frame a page, and single images of any format that is decoded.
 use super::super::files::LARGEST_FILE;
 use super::super::kinds::{kind_of, kind_of_text};
-use super::{Broken, Decoder, Encoded, Format, frame_formats, quoted};
+use super::{Broken, Decoder, Encoded, Format, LONGEST_HEADER, frame_formats, quoted};
 use std::collections::HashSet;
 use std::io::{BufRead, Read, Result as IoResult};
 use std::mem::take;
@@ -24,6 +24,11 @@ pub(super) const OTHERS: Format = Format {
     open: |input| {
         let bytes = whole(input)?;
         if ::image::guess_format(&bytes).is_ok_and(|format| format.reading_enabled()) {
+            // Anymaps in text and of other kinds: the decoder reads the first.
+            let (start, rest) = bytes.split_at(bytes.len().min(8));
+            if start.starts_with(b"P") && rest.windows(8).any(|next| next == start) {
+                return Err(Broken::new("one image", "several: write binary PGM or PPM"));
+            }
             return Ok(Box::new(Single(bytes)));
         }
         if bytes.is_empty() {
@@ -67,6 +72,8 @@ struct Pages {
     next: usize,
     /// Directories that were read: a chain that returns to one of them would never end.
     seen: HashSet<usize>,
+    /// The number of frames that ImageJ states. Of a large stack it writes one directory.
+    announced: usize,
 }
 
 impl Pages {
@@ -82,7 +89,15 @@ impl Pages {
             little_endian,
             next: 0,
             seen: HashSet::new(),
+            announced: 0,
         };
+        let start = &pages.bytes[..pages.bytes.len().min(LONGEST_HEADER as usize)];
+        if let Some(at) = start.windows(7).position(|word| word == b"ImageJ=") {
+            let description = String::from_utf8_lossy(&start[at..]);
+            let mut lines = description.lines();
+            let images = lines.find_map(|line| line.strip_prefix("images="));
+            pages.announced = images.and_then(|n| n.parse().ok()).unwrap_or(0);
+        }
         pages.next = pages.number(4, 4)?;
         Some(pages)
     }
@@ -116,6 +131,19 @@ impl Pages {
 
 impl Decoder for Pages {
     fn next(&mut self, _: &mut dyn BufRead, _: Vec<u8>) -> Result<Option<Encoded>, Broken> {
-        Ok(self.turn().map(Encoded::Page))
+        let page = self.turn();
+        if page.is_none() && self.seen.len() < self.announced {
+            let expected = format!("{} pages, as ImageJ states", self.announced);
+            let remedy = "save the stack as an image sequence";
+            return Err(Broken::new(
+                expected,
+                format!("{}: {remedy}", self.seen.len()),
+            ));
+        }
+        Ok(page.map(Encoded::Page))
+    }
+
+    fn goes_on(&self) -> bool {
+        true
     }
 }
