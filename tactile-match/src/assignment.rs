@@ -13,116 +13,35 @@
 
 use crate::MatchError;
 
-/// Returns the column of each row of a cost matrix (`rows × columns`, row-major) at the least total
+/// Returns the column of each row of a cost matrix of shape `[rows, columns]` at the least total
 /// cost.
 ///
-/// A row gets `None` if there are more rows than columns and it is left over, or if only forbidden
-/// pairs (`+∞`) are left for it. The number of pairs is the largest possible. The answer is
-/// deterministic, also among ties.
+/// `cost(i, j)` is called once for each pair, so the caller may store the matrix in any order, or
+/// not at all. A row gets `None` if there are more rows than columns and it is left over, or if
+/// only forbidden pairs (`+∞`) are left for it. The number of pairs is the largest possible. The
+/// answer is deterministic, also among ties.
 ///
 /// # Errors
-/// [`MatchError::Shape`] if `costs` does not have `rows · columns` entries, [`MatchError::Cost`]
-/// for NaN and `−∞`.
+/// [`MatchError::Cost`] for NaN and `−∞`.
 ///
 /// ```
 /// use tactile_match::linear_assignment;
-/// let costs = [
-///     4.0, 1.0, 3.0, //
-///     2.0, 0.0, 5.0,
-/// ];
+/// let costs = [[4.0, 1.0, 3.0], [2.0, 0.0, 5.0]];
 /// // 1 + 2; the greedy 0 + 3 costs as much.
-/// assert_eq!(linear_assignment(&costs, 2, 3)?, [Some(1), Some(0)]);
+/// assert_eq!(linear_assignment([2, 3], |i, j| costs[i][j])?, [Some(1), Some(0)]);
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 pub fn linear_assignment(
-    costs: &[f64],
-    rows: usize,
-    columns: usize,
+    [rows, columns]: [usize; 2],
+    cost: impl FnMut(usize, usize) -> f64,
 ) -> Result<Vec<Option<usize>>, MatchError> {
-    let mut workspace = AssignmentWorkspace::default();
-    workspace.solve(costs, rows, columns)?;
-    Ok(workspace.assignment)
-}
-
-/// [`linear_assignment`] with reusable memory: it allocates only if a matrix is larger than all
-/// before.
-///
-/// ```
-/// use tactile_match::AssignmentWorkspace;
-/// let mut workspace = AssignmentWorkspace::default();
-/// assert_eq!(workspace.solve(&[2.0, 1.0, 1.0, 5.0], 2, 2)?, [Some(1), Some(0)]);
-/// assert_eq!(workspace.row_prices.iter().chain(&workspace.column_prices).sum::<f64>(), 2.0);
-/// # Ok::<(), tactile_match::MatchError>(())
-/// ```
-#[derive(Clone, Debug, Default)]
-pub struct AssignmentWorkspace {
-    assignment: Vec<Option<usize>>,
-    /// Row prices `u` of the last solution.
-    pub row_prices: Vec<f64>,
-    /// Column prices `v` of the last solution.
-    pub column_prices: Vec<f64>,
-    /// The matrix, transposed if it is taller than wide.
-    turned: Vec<f64>,
-    search: Search,
-}
-
-impl AssignmentWorkspace {
-    /// Solves one problem, see [`linear_assignment`].
-    ///
-    /// # Errors
-    /// Those of [`linear_assignment`].
-    pub fn solve(
-        &mut self,
-        costs: &[f64],
-        rows: usize,
-        columns: usize,
-    ) -> Result<&[Option<usize>], MatchError> {
-        check(costs, rows, columns)?;
-        self.assignment.clear();
-        self.row_prices.clear();
-        self.column_prices.clear();
-        if rows <= columns {
-            self.search.run(costs, rows, columns);
-            self.assignment.extend(
-                self.search
-                    .column_of
-                    .iter()
-                    .map(|&j| (j != NONE).then_some(j)),
-            );
-            self.row_prices
-                .extend((0..rows).map(|i| self.search.row_price(costs, i)));
-            self.column_prices.extend_from_slice(&self.search.prices);
-        } else {
-            self.turned.clear();
-            self.turned
-                .extend((0..columns).flat_map(|j| (0..rows).map(move |i| costs[i * columns + j])));
-            self.search.run(&self.turned, columns, rows);
-            self.assignment
-                .extend(self.search.row_of.iter().map(|&j| (j != NONE).then_some(j)));
-            self.row_prices.extend_from_slice(&self.search.prices);
-            self.column_prices
-                .extend((0..columns).map(|j| self.search.row_price(&self.turned, j)));
-        }
-        Ok(&self.assignment)
-    }
-}
-
-fn check(costs: &[f64], rows: usize, columns: usize) -> Result<(), MatchError> {
-    let expected = rows.saturating_mul(columns);
-    if costs.len() != expected {
-        return Err(MatchError::Shape {
-            what: "costs",
-            expected,
-            found: costs.len(),
-        });
-    }
-    match costs.iter().position(|&c| !(c.is_finite() || c > 0.0)) {
-        Some(at) => Err(MatchError::Cost {
-            row: at / columns,
-            column: at % columns,
-        }),
-        None => Ok(()),
-    }
+    let (search, _) = Search::solved([rows, columns], cost)?;
+    let column_of = match rows <= columns {
+        true => search.column_of,
+        false => search.row_of,
+    };
+    let assigned = column_of.iter().map(|&j| (j != NONE).then_some(j));
+    Ok(assigned.collect())
 }
 
 // The search: augmenting row reduction, then shortest augmenting paths on the reduced costs.
@@ -130,8 +49,8 @@ fn check(costs: &[f64], rows: usize, columns: usize) -> Result<(), MatchError> {
 /// Stands for "no row" or "no column".
 const NONE: usize = usize::MAX;
 
-/// Working memory of the algorithm, for a matrix that is not taller than wide.
-#[derive(Clone, Debug, Default)]
+/// State of the algorithm, for a matrix that is not taller than wide.
+#[derive(Default)]
 struct Search {
     column_of: Vec<usize>,
     row_of: Vec<usize>,
@@ -147,6 +66,25 @@ struct Search {
 }
 
 impl Search {
+    /// The solved search and its costs by rows, transposed if there are more rows than columns.
+    fn solved(
+        [rows, columns]: [usize; 2],
+        mut cost: impl FnMut(usize, usize) -> f64,
+    ) -> Result<(Self, Vec<f64>), MatchError> {
+        let mut checked = |row, column| match cost(row, column) {
+            c if c.is_finite() || c > 0.0 => Ok(c),
+            _ => Err(MatchError::Cost { row, column }),
+        };
+        let [short, long] = [rows.min(columns), rows.max(columns)];
+        let turned = rows > columns;
+        let pairs = (0..short).flat_map(|i| (0..long).map(move |j| (i, j)));
+        let costs = pairs.map(|(i, j)| if turned { checked(j, i) } else { checked(i, j) });
+        let costs: Vec<f64> = costs.collect::<Result<_, _>>()?;
+        let mut search = Self::default();
+        search.run(&costs, short, long);
+        Ok((search, costs))
+    }
+
     fn run(&mut self, costs: &[f64], rows: usize, columns: usize) {
         reset(&mut self.column_of, rows, NONE);
         reset(&mut self.row_of, columns, NONE);
@@ -281,14 +219,6 @@ impl Search {
             }
         }
     }
-
-    /// `u_i` by complementary slackness. Zero if the row is unassigned.
-    fn row_price(&self, costs: &[f64], row: usize) -> f64 {
-        match self.column_of[row] {
-            NONE => 0.0,
-            column => costs[row * self.prices.len() + column] - self.prices[column],
-        }
-    }
 }
 
 /// The columns with the smallest and second smallest reduced cost `c − v`, and these costs. The
@@ -311,3 +241,6 @@ fn reset<V: Clone>(vector: &mut Vec<V>, len: usize, value: V) {
     vector.clear();
     vector.resize(len, value);
 }
+
+#[cfg(test)]
+mod tests;

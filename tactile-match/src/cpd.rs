@@ -659,10 +659,10 @@ impl<const D: usize> Registration<D> {
 /// is kept only if its target is at least as likely to belong to the model point as to be an
 /// outlier.
 fn pairs(posterior: &[f64], model_len: usize, target_len: usize) -> Vec<Option<usize>> {
-    let costs: Vec<f64> = posterior.iter().map(|p| -p).collect();
     let mut assignment = vec![None; model_len];
-    // The costs are probabilities, so they are finite, and their number is correct by construction.
-    let columns = linear_assignment(&costs, target_len, model_len).unwrap_or_default();
+    // The costs are probabilities, hence finite.
+    let cost = |n: usize, m: usize| -posterior[n * model_len + m];
+    let columns = linear_assignment([target_len, model_len], cost).unwrap_or_default();
     for (n, m) in columns.iter().enumerate() {
         let Some(m) = *m else { continue };
         let row = &posterior[n * model_len..][..model_len];

@@ -13,8 +13,8 @@ use tactile_core::CustomError;
 /// let points = [Point2::new(1.0, 2.0)];
 /// let empty = NearestNeighbour::default().match_points(&[], &points).err();
 /// assert_eq!(empty, Some(MatchError::Empty { set: "model" }));
-/// let error = linear_assignment(&[1.0, 2.0, 3.0], 2, 2).unwrap_err();
-/// assert_eq!(error, MatchError::Shape { what: "costs", expected: 4, found: 3 });
+/// let error = linear_assignment([1, 1], |_, _| f64::NAN).unwrap_err();
+/// assert_eq!(error, MatchError::Cost { row: 0, column: 0 });
 /// let error = NearestNeighbour::within(-1.0).unwrap_err();
 /// assert_eq!(error.to_string(), "option max_distance = -1 is outside (0, ∞)");
 /// ```
@@ -64,16 +64,6 @@ pub enum MatchError {
         value: f64,
         /// The range of valid values.
         expected: &'static str,
-    },
-    /// The length of a slice does not match its stated shape.
-    #[error("{what}: expected {expected} entries, found {found}")]
-    Shape {
-        /// Content of the slice.
-        what: &'static str,
-        /// Number of entries required by the shape.
-        expected: usize,
-        /// Number of entries found.
-        found: usize,
     },
     /// A cost is NaN or `−∞`.
     #[error("the cost of row {row}, column {column} is NaN or minus infinity")]

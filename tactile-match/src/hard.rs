@@ -221,14 +221,8 @@ impl<const D: usize> PointMatcher<D> for LinearAssignment {
         point_sets(model, target)?;
         let distances = Distances::new(model, target);
         let limit = distances.limit(self.max_distance);
-        // nalgebra is column-major, so the transpose in memory is row-major.
-        let costs: Vec<f64> = distances
-            .squared
-            .transpose()
-            .iter()
-            .map(|s| s.min(limit))
-            .collect();
-        let mut assignment = linear_assignment(&costs, model.len(), target.len())?;
+        let cost = |i, j| distances.squared[(i, j)].min(limit);
+        let mut assignment = linear_assignment([model.len(), target.len()], cost)?;
         for (i, partner) in assignment.iter_mut().enumerate() {
             *partner = partner.filter(|&j| distances.squared[(i, j)] <= limit);
         }

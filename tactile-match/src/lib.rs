@@ -52,7 +52,7 @@ mod transformation;
 #[cfg(test)]
 extern crate self as tactile_match;
 
-pub use assignment::{AssignmentWorkspace, linear_assignment};
+pub use assignment::linear_assignment;
 pub use cpd::{CoherentPointDrift, Normalization};
 pub use error::MatchError;
 pub use hard::{LinearAssignment, NearestNeighbour};

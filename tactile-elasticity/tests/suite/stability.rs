@@ -10,7 +10,7 @@ use tactile_elasticity::field::StrainField;
 use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator};
 use tactile_elasticity::strain::{
     Biot, Deformation, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, Invariants,
-    PrincipalStretches, StrainMeasure, green_lagrange_into,
+    PrincipalStretches, StrainMeasure,
 };
 use tactile_elasticity::{ElasticityError, Quantity};
 
@@ -122,41 +122,10 @@ proptest! {
 }
 
 #[test]
-fn a_batch_has_the_bits_of_one_at_a_time() {
-    let gradients: Vec<Matrix3<f64>> = (0..300)
-        .map(|i| {
-            let x = f64::from(i);
-            // Every third a large rotation with little strain, for the careful path.
-            let q = Rotation3::from_scaled_axis(Vector3::new(0.3 * x, 1.0, 0.1)).into_inner();
-            if i % 3 == 0 {
-                q - Matrix3::identity()
-            } else {
-                q * 1e-3 * x
-            }
-        })
-        .collect();
-    let mut batch = vec![Matrix3::zeros(); 300];
-    green_lagrange_into(&gradients, &mut batch).unwrap();
-    for (h, e) in gradients.iter().zip(&batch) {
-        assert_eq!(*e, GreenLagrange.strain(h).unwrap());
-    }
-    #[cfg(feature = "rayon")]
-    {
-        let mut parallel = vec![Matrix3::zeros(); 300];
-        tactile_elasticity::strain::green_lagrange_par_into(&gradients, &mut parallel).unwrap();
-        assert_eq!(parallel, batch);
-    }
-    let missing = green_lagrange_into(&gradients, &mut batch[1..]).unwrap_err();
-    let message = "strain: expected 300 entries, found 299";
-    assert_eq!(missing.to_string(), message);
-}
-
-#[test]
-fn batches_and_measures_allocate_nothing() {
+fn measures_allocate_nothing() {
     let gradients = vec![Matrix3::from_diagonal_element(0.01); 100];
     let mut strains = vec![Matrix3::zeros(); 100];
     let info = allocation_counter::measure(|| {
-        green_lagrange_into(&gradients, &mut strains).unwrap();
         for measure in measures() {
             for (h, e) in gradients.iter().zip(&mut strains) {
                 *e = measure.strain(h).unwrap();

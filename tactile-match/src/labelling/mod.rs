@@ -460,12 +460,10 @@ impl<const D: usize> Run<D> {
     /// Distinct partners with the largest sum of probabilities. `None` if the slack is likelier.
     fn assignment(&self) -> Vec<Option<usize>> {
         let (rows, columns) = (self.model.len(), self.target.len());
-        let costs: Vec<f64> = (0..rows)
-            .flat_map(|i| self.matches.row(i)[..columns].iter().map(|&p| -p))
-            .collect();
-        // The entries are finite probabilities, one per pair.
+        // The costs are probabilities, hence finite.
+        let cost = |i, j| -self.matches[(i, j)];
         let mut assignment =
-            linear_assignment(&costs, rows, columns).unwrap_or_else(|_| vec![None; rows]);
+            linear_assignment([rows, columns], cost).unwrap_or_else(|_| vec![None; rows]);
         for (i, partner) in assignment.iter_mut().enumerate() {
             let slack = self.matches[(i, columns)];
             *partner =

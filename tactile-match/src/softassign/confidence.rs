@@ -239,13 +239,8 @@ impl<const D: usize> Answer<D> {
         if left.len().min(open.len()) == 0 || left.len() * open.len() > MAX_COMPLETED {
             return;
         }
-        let cost = |&i: &usize| {
-            let warped = self.warped[i];
-            open.iter()
-                .map(move |&j| squared_distance(&warped, &targets[j]))
-        };
-        let costs: Vec<f64> = left.iter().flat_map(cost).collect();
-        let Ok(pairs) = linear_assignment(&costs, left.len(), open.len()) else {
+        let cost = |i: usize, j: usize| squared_distance(&self.warped[left[i]], &targets[open[j]]);
+        let Ok(pairs) = linear_assignment([left.len(), open.len()], cost) else {
             return;
         };
         for (&i, column) in left.iter().zip(pairs) {

@@ -1,7 +1,6 @@
 //! The tests of `tactile-match`, in one program: the generic code is compiled once for all of them.
 
 mod allocation;
-mod assignment;
 mod common;
 mod conformance;
 mod corpus;

@@ -1,7 +1,13 @@
 //! Linear assignment against brute force and against its own proof of optimality.
 
 use proptest::prelude::*;
-use tactile_match::{AssignmentWorkspace, MatchError, linear_assignment};
+
+use super::{NONE, Search, linear_assignment};
+use crate::MatchError;
+
+fn assigned(costs: &[f64], rows: usize, columns: usize) -> Result<Vec<Option<usize>>, MatchError> {
+    linear_assignment([rows, columns], |i, j| costs[i * columns + j])
+}
 
 fn total(costs: &[f64], columns: usize, assignment: &[Option<usize>]) -> f64 {
     assignment
@@ -46,40 +52,33 @@ fn assert_distinct(assignment: &[Option<usize>], columns: usize) {
     }
 }
 
-/// `u_i + v_j <= c_ij`, equal on the pairs chosen, no positive price on the longer side and none on
-/// what is left over: sufficient for optimality. Rounding: a price is a sum of up to
+/// `u_i + v_j <= c_ij`, equal on the chosen pairs, and no positive price on the longer side nor any
+/// price on a column left over: sufficient for optimality. Rounding: a price is a sum of up to
 /// `rows + columns` costs.
-fn assert_optimal(
-    costs: &[f64],
-    rows: usize,
-    columns: usize,
-    workspace: &AssignmentWorkspace,
-    assignment: &[Option<usize>],
-) {
-    let scale = costs
-        .iter()
-        .filter(|c| c.is_finite())
-        .fold(0.0_f64, |m, c| m.max(c.abs()));
+fn assert_optimal(search: &Search, costs: &[f64]) {
+    let (rows, columns) = (search.column_of.len(), search.row_of.len());
+    let scale = costs.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
     let tolerance = f64::EPSILON * scale * (8 * (rows + columns)) as f64;
-    let (u, v) = (&workspace.row_prices, &workspace.column_prices);
-    for i in 0..rows {
-        for j in 0..columns {
-            let reduced = costs[i * columns + j] - u[i] - v[j];
+    let v = &search.prices;
+    for (row, &column) in costs.chunks(columns).zip(&search.column_of) {
+        let u = row[column] - v[column];
+        for (j, cost) in row.iter().enumerate() {
+            let reduced = cost - u - v[j];
             assert!(
                 reduced >= -tolerance,
-                "pair ({i}, {j}) is cheaper by {reduced:e}"
+                "column {j} is cheaper by {reduced:e}"
             );
-            assert!(assignment[i] != Some(j) || reduced.abs() <= tolerance);
-        }
-        if assignment[i].is_none() {
-            assert_eq!(u[i], 0.0, "a row left over has no price");
         }
     }
-    for j in (0..columns).filter(|&j| !assignment.contains(&Some(j))) {
+    for (j, _) in search
+        .row_of
+        .iter()
+        .enumerate()
+        .filter(|(_, i)| **i == NONE)
+    {
         assert_eq!(v[j], 0.0, "a column left over has no price");
     }
-    let longer = if rows <= columns { v } else { u };
-    assert!(rows == columns || longer.iter().all(|&p| p <= 0.0));
+    assert!(rows == columns || v.iter().all(|&p| p <= 0.0));
 }
 
 fn matrix(
@@ -99,11 +98,11 @@ fn matrix(
 proptest! {
     #[test]
     fn prices_prove_the_least_cost((rows, columns, costs) in matrix(1..=40)) {
-        let mut workspace = AssignmentWorkspace::default();
-        let found = workspace.solve(&costs, rows, columns).unwrap().to_vec();
+        let found = assigned(&costs, rows, columns).unwrap();
         assert_distinct(&found, columns);
         prop_assert_eq!(found.iter().flatten().count(), rows.min(columns));
-        assert_optimal(&costs, rows, columns, &workspace, &found);
+        let (search, costs) = Search::solved([rows, columns], |i, j| costs[i * columns + j]).unwrap();
+        assert_optimal(&search, &costs);
     }
 
     #[test]
@@ -111,7 +110,7 @@ proptest! {
         (rows, columns, costs) in matrix(1..=6), forbidden in prop::collection::vec(any::<bool>(), 36)
     ) {
         let costs: Vec<f64> = costs.iter().zip(forbidden).map(|(&c, no)| if no { f64::INFINITY } else { c }).collect();
-        let found = linear_assignment(&costs, rows, columns).unwrap();
+        let found = assigned(&costs, rows, columns).unwrap();
         assert_distinct(&found, columns);
         prop_assert!(total(&costs, columns, &found).is_finite());
         let (pairs, _) = brute_force(&costs, rows, columns, 0, &mut vec![false; columns]);
@@ -125,7 +124,7 @@ proptest! {
         // The diagonal stays allowed, so that every row can be served and the least cost is well
         // defined.
         let costs: Vec<f64> = (0..n * n).map(|k| if forbidden[k] && k % (n + 1) != 0 { f64::INFINITY } else { costs[k] }).collect();
-        let found = linear_assignment(&costs, n, n).unwrap();
+        let found = assigned(&costs, n, n).unwrap();
         let (pairs, cost) = brute_force(&costs, n, n, 0, &mut vec![false; n]);
         prop_assert_eq!(pairs, n);
         prop_assert!((total(&costs, n, &found) - cost).abs() <= 1e-12);
@@ -136,79 +135,42 @@ proptest! {
         (Just(n), prop::collection::vec(0.0..1.0_f64, n * n)))
     ) {
         let shifted: Vec<f64> = (0..n * n).map(|k| costs[k] + (k / n) as f64 - 3.0 * (k % n) as f64).collect();
-        prop_assert_eq!(linear_assignment(&costs, n, n).unwrap(), linear_assignment(&shifted, n, n).unwrap());
+        prop_assert_eq!(assigned(&costs, n, n).unwrap(), assigned(&shifted, n, n).unwrap());
     }
 
-}
-
-#[test]
-fn a_workspace_forgets_the_last_matrix() {
-    let mut workspace = AssignmentWorkspace::default();
-    let large: Vec<f64> = (0..30 * 20).map(|k| f64::from(k * 7919 % 1009)).collect();
-    for (rows, columns) in [(30, 20), (2, 3), (20, 30), (1, 1), (3, 2)] {
-        let costs = &large[..rows * columns];
-        let again = workspace.solve(costs, rows, columns).unwrap().to_vec();
-        assert_eq!(again, linear_assignment(costs, rows, columns).unwrap());
-    }
 }
 
 #[test]
 fn nothing_to_assign_is_an_answer() {
-    assert_eq!(linear_assignment(&[], 0, 0), Ok(vec![]));
-    assert_eq!(linear_assignment(&[], 3, 0), Ok(vec![None; 3]));
-    assert_eq!(linear_assignment(&[], 0, 3), Ok(vec![]));
-    assert_eq!(linear_assignment(&[f64::INFINITY], 1, 1), Ok(vec![None]));
+    assert_eq!(assigned(&[], 0, 0), Ok(vec![]));
+    assert_eq!(assigned(&[], 3, 0), Ok(vec![None; 3]));
+    assert_eq!(assigned(&[], 0, 3), Ok(vec![]));
+    assert_eq!(assigned(&[f64::INFINITY], 1, 1), Ok(vec![None]));
 }
 
 #[test]
 fn extreme_costs_are_answered() {
     assert_eq!(
-        linear_assignment(&[1e300, 1.0, 1.0, 1e300], 2, 2),
+        assigned(&[1e300, 1.0, 1.0, 1e300], 2, 2),
         Ok(vec![Some(1), Some(0)])
     );
     assert_eq!(
-        linear_assignment(&[-1e300, 1e-300, 1e-300, 0.0], 2, 2),
+        assigned(&[-1e300, 1e-300, 1e-300, 0.0], 2, 2),
         Ok(vec![Some(0), Some(1)])
     );
     assert_eq!(
-        linear_assignment(&[5.0; 16], 4, 4)
-            .unwrap()
-            .iter()
-            .flatten()
-            .count(),
+        assigned(&[5.0; 16], 4, 4).unwrap().iter().flatten().count(),
         4
     );
 }
 
 #[test]
 fn unusable_costs_are_typed_errors() {
-    let shape = MatchError::Shape {
-        what: "costs",
-        expected: 6,
-        found: 5,
-    };
-    assert_eq!(linear_assignment(&[0.0; 5], 2, 3), Err(shape));
     for bad in [f64::NAN, f64::NEG_INFINITY] {
         let costs = [0.0, 1.0, 2.0, 3.0, bad, 5.0];
         assert_eq!(
-            linear_assignment(&costs, 2, 3),
+            assigned(&costs, 2, 3),
             Err(MatchError::Cost { row: 1, column: 1 })
         );
     }
-}
-
-#[test]
-fn no_allocation_after_the_first_call() {
-    let costs: Vec<f64> = (0..60 * 80).map(|k| f64::from(k * 7919 % 10007)).collect();
-    let mut workspace = AssignmentWorkspace::default();
-    workspace.solve(&costs, 80, 60).unwrap();
-    workspace.solve(&costs, 60, 80).unwrap();
-    let counted = allocation_counter::measure(|| {
-        for (rows, columns) in [(60, 80), (80, 60), (10, 10)] {
-            workspace
-                .solve(&costs[..rows * columns], rows, columns)
-                .unwrap();
-        }
-    });
-    assert_eq!(counted.count_total, 0);
 }
