@@ -44,7 +44,9 @@ mod scales;
 mod search;
 mod starts;
 
-pub use options::{AnnealedSoftassign, Mechanism, Outliers, Rotation, Search, Transformation};
+#[cfg_attr(not(feature = "ablation"), allow(unreachable_pub))]
+pub use options::Mechanism;
+pub use options::{AnnealedSoftassign, Outliers, Rotation, Search, Transformation};
 pub use result::SoftassignMatch;
 
 use crate::frame::centre_and_radius;

@@ -22,9 +22,10 @@ pub(super) struct Slack {
 /// Weight of the slack on a side without expected outliers.
 const RARE: f64 = 0.01;
 
-/// Parts that the ablation study switches off.
+/// Parts that the ablation study switches off. Public with the feature `ablation` only.
 #[doc(hidden)]
 #[allow(missing_docs)]
+#[cfg_attr(not(feature = "ablation"), allow(unreachable_pub))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mechanism {
     Patterns,
