@@ -113,7 +113,10 @@ impl Context {
     /// object, or null) and its sentence.
     pub(crate) fn warn(&mut self, kind: &str, numbers: Value, sentence: impl Display) {
         let sentence = sentence.to_string();
-        self.row("caution", &sentence);
+        if let Some(report) = &mut self.outputs.report {
+            report.caution_of(kind, &sentence);
+        }
+        self.aside(format_args!("{:<18}{sentence}", "caution"));
         let mut caution = json!({ "kind": kind, "text": sentence });
         if let (Value::Object(caution), Value::Object(mut numbers)) = (&mut caution, numbers) {
             caution.append(&mut numbers);

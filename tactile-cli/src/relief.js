@@ -24,6 +24,13 @@ function turnable(canvas) {
       const corners = [at(row, column), at(row, column + 1), at(row + 1, column + 1), at(row + 1, column)];
       if (corners.every((p) => p[3] === p[3])) faces.push([corners, corners.reduce((sum, p) => sum + p[2], 0)]);
     }
+    // Each face is cut along the level below which the rim lies.
+    const level = stretch * (dz * relief.cut - high / 2), above = (p) => p[3] >= level;
+    const trimmed = (corners) => corners.flatMap((p, k) => {
+      const q = corners[(k + 1) % corners.length], share = (level - p[3]) / (q[3] - p[3]);
+      const kept = above(p) ? [p] : [];
+      return above(p) === above(q) ? kept : [...kept, p.map((v, i) => v + share * (q[i] - v))];
+    });
     faces.sort((a, b) => a[1] - b[1]);
     c.clearRect(0, 0, canvas.width, canvas.height);
     for (const [corners] of faces) {
@@ -33,7 +40,7 @@ function turnable(canvas) {
       const light = 52 + 16 * slope / Math.hypot(1, slope);
       c.fillStyle = c.strokeStyle = `hsl(${250 - 200 * share} 65% ${light}%)`;
       c.beginPath();
-      corners.forEach((p) => c.lineTo(p[0], p[1]));
+      trimmed(corners).forEach((p) => c.lineTo(p[0], p[1]));
       c.closePath();
       c.fill();
       c.stroke();

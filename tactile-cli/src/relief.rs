@@ -5,14 +5,24 @@ use serde::Serialize;
 /// Points along a side, at most: more would be no clearer, and turn slowly.
 const POINTS: usize = 80;
 
+/// Steps from the lowest to the highest point: finer than a page shows.
+const STEPS: u32 = 10_000;
+
+/// A rim below this share of the height is the foot of a dome: of a hemisphere ten points in radius
+/// the rim reaches to 0.44.
+const FOOT: f64 = 0.5;
+
 /// Heights on a grid, as `relief.js` draws them.
 #[derive(Serialize)]
 pub(crate) struct HeightGrid {
     columns: usize,
     /// Size of a grid cell along x and y and of a step of height, in millimetres.
     steps_mm: [f64; 3],
-    /// Row by row, in steps above the lowest. None where there is no surface.
+    /// Row by row, in steps above the lowest. `None` if there is no surface.
     heights: Vec<Option<u32>>,
+    /// The height, in steps, along which the surface is cut: the rim of a dome is a ragged staircase
+    /// of the grid, and lies below.
+    cut: u32,
     /// From the lowest to the highest point.
     pub height_mm: f64,
 }
@@ -40,8 +50,7 @@ impl HeightGrid {
         let step = sides[0].max(sides[1]).div_ceil(POINTS);
         let rows = (first[0]..=last[0]).step_by(step);
         let columns = (first[1]..=last[1]).step_by(step);
-        // A ten-thousandth of the height is finer than a page shows.
-        let unit = 1e-4 * (high - low);
+        let unit = (high - low) / f64::from(STEPS);
         let cell = |at: (usize, usize)| {
             let height = heights[at];
             height
@@ -49,14 +58,32 @@ impl HeightGrid {
                 .then(|| ((height - low) / unit).round() as u32)
         };
         let [dx, dy] = pixel.map(|side| side * step as f64);
+        let width = columns.clone().count();
+        let grid = rows.flat_map(|row| columns.clone().map(move |column| (row, column)));
+        let heights: Vec<_> = grid.map(cell).collect();
         Some(Self {
-            columns: columns.clone().count(),
+            cut: cut(&heights, width),
+            columns: width,
             steps_mm: [dx, dy, unit],
-            heights: rows
-                .flat_map(|row| columns.clone().map(move |column| (row, column)))
-                .map(cell)
-                .collect(),
+            heights,
             height_mm: high - low,
         })
+    }
+}
+
+/// The highest point of the rim, beside which there is no surface, if the rim is the foot of a dome;
+/// else 0, which cuts nothing.
+fn cut(heights: &[Option<u32>], columns: usize) -> u32 {
+    let rows = heights.len() / columns;
+    let outside = |row: usize, column: usize| {
+        let near = |at: usize, end: usize| at.saturating_sub(1)..(at + 2).min(end);
+        near(row, rows).any(|r| near(column, columns).any(|c| heights[r * columns + c].is_none()))
+    };
+    let rim = heights.iter().enumerate();
+    let rim = rim.filter(|(k, _)| outside(k / columns, k % columns));
+    let highest = rim.filter_map(|(_, height)| *height).max().unwrap_or(0);
+    match f64::from(highest) < FOOT * f64::from(STEPS) {
+        true => highest,
+        false => 0,
     }
 }

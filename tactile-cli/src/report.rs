@@ -5,7 +5,7 @@ use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use hmac_sha256::Hash;
 use ndarray::ArrayView2;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::fmt::Write;
 use std::io::Read;
@@ -93,12 +93,8 @@ impl Report {
 
     /// Adds a name and its value, which are printed too.
     pub(crate) fn row(&mut self, name: &str, value: &str) {
-        if ["warning", "caution"].contains(&name) {
-            self.caution(value, "");
-        } else {
-            let row = Printed::Row(name.to_owned(), value.to_owned());
-            self.printed.push(row);
-        }
+        let row = Printed::Row(name.to_owned(), value.to_owned());
+        self.printed.push(row);
     }
 
     /// Adds a sentence to the answer at the top.
@@ -106,14 +102,22 @@ impl Report {
         self.answers.push(text.into());
     }
 
-    /// Adds a caution and what to do about it, which may be empty.
+    /// Adds a caution and what to do about it, which may be empty. A caution stands on the page once.
     pub(crate) fn caution(&mut self, text: impl Into<String>, remedy: &str) {
-        self.cautions.push([text.into(), remedy.into()]);
+        let caution = [text.into(), remedy.into()];
+        if !self.cautions.contains(&caution) {
+            self.cautions.push(caution);
+        }
+    }
+
+    /// Adds a caution of a kind.
+    pub(crate) fn caution_of(&mut self, kind: &str, text: &str) {
+        self.caution(text, remedy(kind));
     }
 
     /// Adds a caution of the library.
     pub(crate) fn flag(&mut self, flag: &Flag) {
-        self.caution(flag.to_string(), remedy(flag));
+        self.caution(flag.to_string(), remedy(&kind(flag)));
     }
 
     /// Adds a table of names and values.
@@ -159,10 +163,6 @@ impl Report {
                 let ends = interval_text(found.interval_95, found.standard_error, 1e-3);
                 self.answer(format!("with 95 % confidence {ends} kPa"));
                 self.answer(format!("by the estimator {}", found.estimator));
-                for warning in &found.warnings {
-                    let remedy = "The estimator assumes otherwise: compare the other estimators.";
-                    self.caution(warning.to_string(), remedy);
-                }
             }
             Err(error) => self.answer(format!("No modulus: {error}")),
         }
@@ -334,25 +334,29 @@ fn row(page: &mut String, name: &str, value: &str) -> std::fmt::Result {
     writeln!(page, "<tr><th>{name}</th><td>{value}</td></tr>")
 }
 
-/// What to do about a caution.
-fn remedy(flag: &Flag) -> &'static str {
-    match flag {
-        Flag::Saturated { .. } => "Lower the exposure or the gain, and calibrate again.",
-        Flag::OutOfCalibration { .. } => "Calibrate up to larger forces, or press less.",
-        Flag::TouchesEdge { .. } => "Move the object to the middle of the frame.",
-        Flag::SeveralContacts { .. } => "Press with one object, and clean the sensor.",
-        Flag::LightDrifted { .. } => "Take a new reference shortly before the frames.",
-        Flag::NotABall { .. } | Flag::NotThePunch { .. } => {
-            "State the object's true shape in the scene."
-        }
-        Flag::NotRound { .. } => "Press straight down, or state the object's true shape.",
-        Flag::LightNotProportional { .. } => "Calibrate with more pairs, as a curve.",
-        Flag::GaugeDisagrees { .. } => "Check the gauge's zero and the calibration.",
-        Flag::UnlikelyStress { .. } => "Check the units of forces, light and pixels.",
-        Flag::FaceSticks { .. } => "Lubricate the face, or bond it.",
-        Flag::SampleRelaxes { .. } => "State the times of the frames, and hold the load.",
-        Flag::SensorDrifts { .. } => "Take references between the frames.",
-        _ => "Read the number with care: an assumption behind it does not hold.",
+/// Kinds of cautions with their remedies: the tables of the guide.
+const CAUTIONS: &str = include_str!("../cautions.md");
+
+/// What to do about a caution of a kind, by the guide; empty for a kind that it does not list.
+fn remedy(kind: &str) -> &'static str {
+    let row = CAUTIONS.lines().find(|line| {
+        let cell = line.strip_prefix("| `").and_then(|row| row.split_once('`'));
+        cell.is_some_and(|(listed, _)| listed == kind)
+    });
+    let cells = row.and_then(|row| row.trim_end_matches(" |").rsplit_once(" | "));
+    cells.map_or("", |(_, remedy)| remedy)
+}
+
+/// The kind of a caution of the library, by which the guide lists it. That of an assumption is the
+/// kind of its warning.
+fn kind(flag: &Flag) -> String {
+    let name = match flag {
+        Flag::Assumption { warning } => json!(warning),
+        _ => json!(flag)["kind"].clone(),
+    };
+    match name {
+        Value::Object(fields) => fields.keys().next().cloned().unwrap_or_default(),
+        word => word.as_str().unwrap_or_default().to_owned(),
     }
 }
 
@@ -434,6 +438,7 @@ pre { font: .8rem/1.5 ui-monospace, monospace; overflow-x: auto; margin: .5rem 0
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tactile_imaging::elasticity::modulus::Warning;
 
     #[test]
     fn text_of_others_stays_text() {
@@ -450,6 +455,19 @@ mod tests {
         assert!(!page.contains("<script") && !page.contains('\u{202e}'));
         assert_eq!(page.matches("&lt;script&gt;").count(), 12);
         assert!(page.contains("content=\"default-src 'none';"));
+    }
+
+    #[test]
+    fn a_caution_has_the_remedy_of_its_kind_once() {
+        let mut report = Report::new("r.html".into(), &[], String::new());
+        let warning = Warning::GuideIgnored;
+        for flag in [Flag::TouchesEdge { frame: 0 }, Flag::Assumption { warning }] {
+            report.flag(&flag);
+            report.flag(&flag);
+        }
+        let remedies = report.cautions.iter().map(|[_, remedy]| remedy.as_str());
+        let begins: Vec<_> = remedies.map(|r| r.split(' ').next().unwrap()).collect();
+        assert_eq!(begins, ["Move", "Use"]);
     }
 
     #[test]

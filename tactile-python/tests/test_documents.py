@@ -20,7 +20,7 @@ def test_a_notebook_runs(path):
     assert path.stat().st_size < 100_000
 
 
-@pytest.mark.parametrize("name", ["README.md", "docs/python.md"])
+@pytest.mark.parametrize("name", ["README.md", "docs/python.md", "docs/own_stage.md", "docs/match_warp_strain.md"])
 def test_the_python_of_a_page_runs(name):
     text = (DATA.parents[1] / name).read_text(encoding="utf-8")
     code = re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)

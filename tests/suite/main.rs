@@ -3,6 +3,7 @@
 
 mod architecture;
 mod assumptions;
+mod cautions;
 mod check_presses;
 mod circles;
 mod common;

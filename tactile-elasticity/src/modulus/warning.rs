@@ -9,7 +9,11 @@
 /// assert!(warning.to_string().contains("0.5"));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize),
+    serde(rename_all = "snake_case")
+)]
 #[non_exhaustive]
 pub enum Warning {
     /// a/R is outside the range of small-contact theory.
