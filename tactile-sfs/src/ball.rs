@@ -7,16 +7,17 @@ use ndarray::ArrayView2;
 
 use crate::Domain;
 
-/// Ratio of the radii that are tried: sixty span a factor of a hundred.
+/// Ratio between neighbouring trial radii: sixty steps cover a factor of a hundred.
 const RADIUS_STEP: f64 = 1.08;
 
-/// A spherical cap z = √(R² − ρ²) − √(R² − a²), ρ the distance from the centre, fitted to heights.
+/// A spherical cap z = √(R² − ρ²) − √(R² − a²) fitted to heights, with ρ the distance from the
+/// centre.
 ///
 /// ```
 /// use ndarray::Array2;
 /// use tactile_sfs::{BallFit, Domain};
-/// // A ball of 4 mm radius, in contact up to 2.4 mm from its axis, is 4 − √(4² − 2.4²) = 0.8 mm
-/// // deep.
+/// // A ball of 4 mm radius, in contact up to 2.4 mm from its axis, has an indentation of
+/// // 4 − √(4² − 2.4²) = 0.8 mm.
 /// let depth_m = |(r, c): (usize, usize)| {
 ///     let square = 1e-8 * ((r as f64 - 32.0).powi(2) + (c as f64 - 32.0).powi(2));
 ///     (16e-6 - square).sqrt() - 3.2e-3
@@ -34,18 +35,18 @@ const RADIUS_STEP: f64 = 1.08;
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct BallFit {
-    /// The ball's radius R in metres.
+    /// Radius R of the ball in metres.
     pub radius_m: f64,
     /// Centre (x, y) in metres from the first pixel of the heights.
     pub centre_m: [f64; 2],
     /// Radius a of the circle where the cap meets depth zero, in metres.
     pub contact_radius_m: f64,
-    /// Mean absolute difference between heights and cap over the pixels inside that circle, in
-    /// metres.
+    /// Mean absolute difference between heights and cap over the pixels inside the contact circle,
+    /// in metres.
     pub mean_absolute_error_m: f64,
-    /// Number of those pixels.
+    /// Number of pixels inside the contact circle.
     pub pixels: usize,
-    /// Gauss–Newton steps.
+    /// Number of Gauss–Newton steps.
     pub iterations: usize,
 }
 
@@ -53,8 +54,8 @@ impl BallFit {
     /// Fits a ball of radius `radius_m` by least squares over the centre and the height of its
     /// equator.
     ///
-    /// Gauss–Newton, O(pixels) a step. `None` where fewer than 16 pixels have a height, where they
-    /// are wider than the ball, or where no cap fits. Also for a mask of another shape.
+    /// Gauss–Newton, O(pixels) per step. `None` if fewer than 16 pixels have a height, if the
+    /// heights extend farther than the ball, if no cap fits, or if the mask has another shape.
     pub fn of_radius(
         heights: ArrayView2<'_, f64>,
         domain: &Domain<'_, f64>,
@@ -63,11 +64,11 @@ impl BallFit {
         fit(&pixels(heights, domain)?, radius_m)
     }
 
-    /// Fits a ball of the radius with the least mean absolute error.
+    /// Fits a ball and its radius: the radius with the least mean absolute error.
     ///
-    /// Takes the best of 60 radii, from the half width of the heights to a hundred times that, then
-    /// a golden-section search between its neighbours. 120 fits of a known radius. `None` as for
-    /// [`of_radius`](Self::of_radius).
+    /// The best of 60 radii, from half the width of the heights to a hundred times that, is refined
+    /// by a golden-section search between its neighbours. The cost is that of 120 fits with a known
+    /// radius. `None` under the conditions of [`of_radius`](Self::of_radius).
     pub fn of_any_radius(heights: ArrayView2<'_, f64>, domain: &Domain<'_, f64>) -> Option<Self> {
         let pixels = pixels(heights, domain)?;
         let ([x, y], (rows, columns)) = (domain.pixel_size_m, heights.dim());
@@ -79,7 +80,7 @@ impl BallFit {
         let best = radii.min_by(|a, b| error(*a).total_cmp(&error(*b)))?;
         let (mut low, mut high) = (best / RADIUS_STEP, best * RADIUS_STEP);
         let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-        // 30 steps narrow the bracket of 16 % to a millionth of it.
+        // 30 steps reduce the bracket of 16 % to a millionth of its width.
         for _ in 0..30 {
             let (a, b) = (high - golden * (high - low), low + golden * (high - low));
             if error(a) < error(b) {
@@ -91,7 +92,7 @@ impl BallFit {
         fit(&pixels, 0.5 * (low + high))
     }
 
-    /// Depth of the cap in metres at (x, y) in metres. Zero outside the circle.
+    /// Depth of the cap in metres at (x, y) in metres: zero outside the circle.
     pub fn depth_m(&self, [x, y]: [f64; 2]) -> f64 {
         let square = (x - self.centre_m[0]).powi(2) + (y - self.centre_m[1]).powi(2);
         if square >= self.contact_radius_m.powi(2) {
@@ -117,8 +118,8 @@ impl fmt::Display for BallFit {
     }
 }
 
-/// The pixels with a height as (x, y, z) in metres. `None` for a domain of another shape, or too
-/// few pixels to trust.
+/// The pixels with a height, as (x, y, z) in metres. `None` if the domain has another shape or the
+/// pixels are too few.
 fn pixels(heights: ArrayView2<'_, f64>, domain: &Domain<'_, f64>) -> Option<Vec<[f64; 3]>> {
     domain.bounding_box(heights.dim()).ok()?;
     let [hx, hy] = domain.pixel_size_m;
@@ -136,7 +137,7 @@ fn fit(pixels: &[[f64; 3]], radius_m: f64) -> Option<BallFit> {
         return None;
     }
     let mean = |k: usize| pixels.iter().map(|p| p[k]).sum::<f64>() / pixels.len() as f64;
-    // Centre and height of the equator. Under a cap less than half a ball deep the latter is
+    // Centre and height of the equator. If the cap is less deep than half a ball, the height is
     // negative.
     let mut at = Vector3::new(mean(0), mean(1), 0.0);
     let mut iterations = 0;
@@ -146,7 +147,7 @@ fn fit(pixels: &[[f64; 3]], radius_m: f64) -> Option<BallFit> {
         for [x, y, z] in pixels {
             let (u, v) = (x - at.x, y - at.y);
             let square = radius_m * radius_m - u * u - v * v;
-            // At the ball's equator the slope has no end: such pixels carry no height.
+            // At the ball's equator the slope is infinite: such pixels are left out.
             if square > 1e-6 * radius_m * radius_m {
                 let up = square.sqrt();
                 let slope = Vector3::new(u / up, v / up, 1.0);
@@ -156,13 +157,13 @@ fn fit(pixels: &[[f64; 3]], radius_m: f64) -> Option<BallFit> {
         }
         let step = normal.cholesky()?.solve(&right);
         at += step;
-        // Far below any pixel, and above the rounding of coordinates.
+        // Far smaller than a pixel, and larger than the rounding of coordinates.
         if step.amax() < 1e-9 * radius_m {
             break;
         }
     }
     let contact_radius_m = (radius_m * radius_m - at.z * at.z).sqrt();
-    // An equator above depth zero would mean more than half of a ball. NaN fails both comparisons.
+    // An equator above depth zero would mean more than half a ball. NaN fails both comparisons.
     if !(at.z < 0.0 && contact_radius_m > 0.0) {
         return None;
     }

@@ -1,23 +1,24 @@
 //! The image and mask of a contact on a coarser grid, ready for reconstruction.
 //!
-//! A contact of 10⁵ pixels carries 200 control points, and the heights between them are not used.
-//! Means over blocks of pixels cost one pass, lower the noise by the block's width, and leave the
-//! reconstruction a small grid.
+//! A contact of 10⁵ pixels has about 200 control points, and the heights between them are not used.
+//! Means over blocks of pixels need one pass, reduce the noise by the block's width, and leave a
+//! small grid for the reconstruction.
 
 use ndarray::{Array2, ArrayView2, Axis, Slice, Zip, aview_mut1};
 
 use crate::surface::fill_shape;
 
-/// Distance from the contour within which a rim's cell is left out, in pixels. A whole ring less would
-/// cost the surface a quarter of its height, and more of a smaller contact's.
+/// Distance from the contour, in pixels, within which a cell of the rim is left out. Without a
+/// whole ring of pixels, the surface would lose a quarter of its height, and a smaller contact
+/// more.
 const RIM_DISTANCE_PX: f64 = 0.25;
 
-/// How many pixels one node of the reconstruction's grid covers.
+/// Number of pixels per node of the reconstruction grid.
 ///
 /// ```
 /// use tactile_sfs::Binning;
-/// // 3,200 pixels for 200 control points leave 16 for each: every pixel is kept. Four times as
-/// // many allow 2 × 2 blocks.
+/// // 3,200 pixels for 200 control points are 16 per point: every pixel is kept. Four times as
+/// // many pixels allow blocks of 2 × 2.
 /// assert_eq!(Binning::Auto.side(3_200, 200), 1);
 /// assert_eq!(Binning::Auto.side(12_800, 200), 2);
 /// assert_eq!(Binning::Blocks(5).side(10, 200), 5);
@@ -25,29 +26,29 @@ const RIM_DISTANCE_PX: f64 = 0.25;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Binning {
-    /// Blocks as large as the control points allow: at least 16 of them inside the contact for
-    /// every point.
+    /// Blocks as large as the control points allow: at least 16 blocks inside the contact per
+    /// point.
     #[default]
     Auto,
-    /// Blocks of n × n pixels, with 1 for every pixel on its own.
+    /// Blocks of n × n pixels; 1 keeps every pixel.
     Blocks(usize),
 }
 
 impl Binning {
-    /// Side of a block in pixels, for a contact of `pixels` with `points` control points. Never
-    /// less than 1.
+    /// Side of a block in pixels, for a contact of `pixels` with `points` control points. At least
+    /// 1.
     pub fn side(self, pixels: usize, points: usize) -> usize {
         match self {
-            // With 16 blocks a point, points stand four or more blocks apart. Finer grids cost
-            // time, and neither heights nor strains become better.
+            // With 16 blocks per point, neighbouring points are four or more blocks apart. Finer
+            // grids cost time and improve neither heights nor strains.
             Self::Auto => (pixels / (16 * points.max(1))).isqrt().max(1),
             Self::Blocks(side) => side.max(1),
         }
     }
 }
 
-/// A contact's signal and mask on a grid of square blocks, with the memory to fill them again
-/// without allocating.
+/// Signal and mask of a contact on a grid of square blocks. Its memory is reused, so that filling
+/// it again does not allocate.
 ///
 /// ```
 /// use ndarray::{Array2, array};
@@ -59,11 +60,11 @@ impl Binning {
 /// contact.load([frame.view(), reference.view()], 2, 1.0);
 /// contact.load_mask(mask.view(), 2);
 /// assert_eq!(contact.signal, array![[3.0, 23.0]]);
-/// assert_eq!(contact.mask, array![[true, false]]); // three and two of four pixels
+/// assert_eq!(contact.mask, array![[true, false]]); // three and two of the four pixels
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct BinnedContact {
-    /// Mean difference frame − reference of every block, times the scale.
+    /// Mean difference frame − reference of each block, times the scale.
     pub signal: Array2<f64>,
     /// Blocks that belong to the contact.
     pub mask: Array2<bool>,
@@ -73,11 +74,11 @@ pub struct BinnedContact {
 }
 
 impl BinnedContact {
-    /// Takes the mean differences frame − reference of blocks of `side` × `side` pixels, times
+    /// Computes the mean differences frame − reference of blocks of `side` × `side` pixels, times
     /// `scale`.
     ///
-    /// Both images start at the first block. Rows and columns that fill no whole block are left
-    /// out. O(pixels).
+    /// Both images start at the first block. Rows and columns that do not fill a whole block are
+    /// left out. O(pixels).
     ///
     /// # Panics
     /// If the images differ in shape.
@@ -90,7 +91,8 @@ impl BinnedContact {
         let reference = reference.slice_axis_move(Axis(1), pixels);
         let scale = scale / (side * side) as f64;
         for (band, mut blocks) in self.signal.rows_mut().into_iter().enumerate() {
-            // Whole numbers are summed over the rows of a band: exact, and in wide instructions.
+            // Integers are summed over the rows of a band, which is exact and uses SIMD
+            // instructions.
             self.sums.clear();
             self.sums.resize(columns * side, 0);
             for row in band * side..(band + 1) * side {
@@ -109,8 +111,8 @@ impl BinnedContact {
     /// Marks the blocks of the loaded signal of which at least three quarters lie in `mask`.
     /// O(pixels).
     ///
-    /// With fewer, the contact's rim draws the surface down. The mask starts at the first block. It
-    /// may be smaller than the blocks, and beyond it nothing is contact.
+    /// With a lower fraction, the rim of the contact would lower the surface. The mask starts at
+    /// the first block. It may be smaller than the blocks: nothing outside it is contact.
     pub fn load_mask(&mut self, mask: ArrayView2<'_, bool>, side: usize) {
         let side = side.max(1);
         fill_shape(&mut self.mask, self.signal.dim(), false);
@@ -132,12 +134,13 @@ impl BinnedContact {
         }
     }
 
-    /// Removes from the mask the pixels at the rim of a round contact that only the blur lights.
+    /// Removes from the mask the pixels at the rim of a round contact that are lit only by the
+    /// blur.
     ///
-    /// A hemisphere has the reflectance √(2d/a) at the distance d from the rim of its contact of
-    /// radius a. Pixels darker than that a quarter of a pixel inside the rim are partly covered,
-    /// and would be cliffs of the surface. For a signal between 0 and 1 on a grid of single pixels.
-    /// O(pixels).
+    /// At the distance d from the rim of its contact of radius a, a hemisphere has the reflectance
+    /// √(2d/a). Pixels darker than that a quarter of a pixel inside the rim are partly covered and
+    /// would become cliffs of the surface. The signal must lie between 0 and 1, on a grid of single
+    /// pixels. O(pixels).
     ///
     /// ```
     /// use ndarray::array;
@@ -156,11 +159,12 @@ impl BinnedContact {
             .zip_mut_with(&self.signal, |inside, &light| *inside &= light >= least);
     }
 
-    /// Smooths the signal by two passes of a box of `width` pixels along both axes.
+    /// Smooths the signal by two passes of a moving average over `width` pixels along both axes.
     ///
-    /// That is nearly a Gaussian of standard deviation √((width² − 1)/6). `width` is odd, and 1
-    /// does nothing. Every value moves from the sharp towards the smoothed one by the share
-    /// `share(smoothed)`. Beyond the edge the last pixel is continued. O(pixels × width).
+    /// The result is nearly that of a Gaussian of standard deviation √((width² − 1)/6). `width`
+    /// must be odd, and 1 changes nothing. Each value is moved from the sharp towards the smoothed
+    /// one by the fraction `share(smoothed)`. The edge pixels are repeated beyond the edge.
+    /// O(pixels × width).
     ///
     /// ```
     /// use ndarray::Array2;
@@ -194,8 +198,8 @@ impl BinnedContact {
     }
 }
 
-/// Means over `width` neighbours of a row. The row is added up shifted, which for usual widths
-/// takes a fifth of the time of a running sum, whose every step waits for the one before.
+/// Means over `width` neighbours along a row. Shifted copies of the row are added. For usual widths
+/// that takes a fifth of the time of a running sum, in which each step depends on the previous one.
 fn mean_along(row: &mut [f64], line: &mut Vec<f64>, width: usize) {
     let (half, columns) = (width / 2, row.len());
     line.clear();
@@ -210,14 +214,14 @@ fn mean_along(row: &mut [f64], line: &mut Vec<f64>, width: usize) {
     row.iter_mut().for_each(|pixel| *pixel /= width);
 }
 
-/// Means over `width` neighbours of every column.
+/// Means over `width` neighbours along every column.
 fn mean_across(pixels: &mut [f64], columns: usize, image: &mut Vec<f64>, width: usize) {
     image.clear();
     image.extend_from_slice(pixels);
     let (half, last) = (width / 2, pixels.len() / columns - 1);
     let line = |row: usize| &image[row * columns..(row + 1) * columns];
     for (row, means) in pixels.chunks_exact_mut(columns).enumerate() {
-        // Counted from the row half a width above.
+        // Counted from the row half a width above this one.
         let near = |shift: usize| (row + shift).saturating_sub(half).min(last);
         means.copy_from_slice(line(near(0)));
         for shift in 1..width {

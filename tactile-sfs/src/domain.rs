@@ -1,16 +1,16 @@
-//! Where to solve: mask, pixel size and the heights that are known.
+//! Domain of a reconstruction: mask, pixel size and known heights.
 
 use ndarray::ArrayView2;
 use tactile_core::Requirement;
 
 use crate::{BoundingBox, PixelScalar, SfsError};
 
-/// The pixels to solve for, their size, and what is known of the heights.
+/// Pixels to solve for, their size, and the known heights.
 ///
-/// `mask` selects the pixels whose height is wanted (all without one). Nothing outside its bounding
-/// box is read or costs time. `known_heights` fixes heights where it is not NaN, inside the mask or
-/// outside it: a height known outside is a boundary value. Heights have the unit of `pixel_size_m`.
-/// [`Default`] is the whole image with heights in pixels.
+/// `mask` selects the pixels whose height is computed (all pixels without a mask). Pixels outside
+/// its bounding box are neither read nor computed. `known_heights` fixes heights at the pixels that
+/// are not NaN, inside or outside the mask: a height known outside is a boundary value. Heights
+/// have the unit of `pixel_size_m`. [`Default`] is the whole image with heights in pixels.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -23,7 +23,7 @@ use crate::{BoundingBox, PixelScalar, SfsError};
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Domain<'a, T> {
-    /// Pixels to solve for. All of them if `None`.
+    /// Pixels to solve for, or all pixels if `None`.
     pub mask: Option<ArrayView2<'a, bool>>,
     /// Width (x) and height (y) of a pixel in metres.
     pub pixel_size_m: [T; 2],
@@ -43,10 +43,10 @@ impl<T: PixelScalar> Default for Domain<'_, T> {
 }
 
 impl<'a, T: PixelScalar> Domain<'a, T> {
-    /// The whole image, pixels of the given width and height, nothing known.
+    /// The whole image with pixels of the given width and height, and without known heights.
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] unless both sizes are positive and finite.
+    /// [`SfsError::InvalidOption`] if a size is not positive and finite.
     pub fn new(pixel_size_m: [T; 2]) -> Result<Self, SfsError> {
         let domain = Self {
             mask: None,
@@ -92,8 +92,8 @@ impl<'a, T: PixelScalar> Domain<'a, T> {
         Ok(())
     }
 
-    /// Checks the domain against an image of `shape` (rows, columns) and returns the box that holds
-    /// the mask.
+    /// Checks the domain against an image of `shape` (rows, columns) and returns the bounding box
+    /// of the mask.
     ///
     /// ```
     /// use ndarray::array;
@@ -106,9 +106,9 @@ impl<'a, T: PixelScalar> Domain<'a, T> {
     /// ```
     ///
     /// # Errors
-    /// [`SfsError::EmptyImage`], [`SfsError::EmptyMask`], [`SfsError::ShapeMismatch`] of the mask
-    /// or the known heights, [`SfsError::InvalidOption`] for a pixel size that is not positive and
-    /// finite.
+    /// [`SfsError::EmptyImage`], [`SfsError::EmptyMask`], [`SfsError::ShapeMismatch`] for the mask
+    /// or the known heights, and [`SfsError::InvalidOption`] for a pixel size that is not positive
+    /// and finite.
     pub fn bounding_box(&self, shape: (usize, usize)) -> Result<BoundingBox, SfsError> {
         self.check_pixel_size()?;
         let (rows, columns) = shape;
@@ -125,16 +125,16 @@ impl<'a, T: PixelScalar> Domain<'a, T> {
         BoundingBox::of_mask(mask).ok_or(SfsError::EmptyMask)
     }
 
-    /// Whether the height of a pixel is wanted.
+    /// Whether the height of a pixel is to be computed.
     ///
     /// # Panics
-    /// If the pixel lies outside the mask's array.
+    /// If the pixel lies outside the mask array.
     #[inline]
     pub fn contains(&self, row: usize, column: usize) -> bool {
         self.mask.is_none_or(|mask| mask[[row, column]])
     }
 
-    /// The known height of a pixel, if there is one.
+    /// The known height of a pixel. `None` if it is not known.
     ///
     /// # Panics
     /// If the pixel lies outside the array of known heights.
@@ -146,7 +146,7 @@ impl<'a, T: PixelScalar> Domain<'a, T> {
     }
 }
 
-/// Refuses an input of another shape.
+/// Returns an error if an input has another shape.
 pub(crate) fn same_shape(
     input: &'static str,
     expected: (usize, usize),
@@ -162,7 +162,8 @@ pub(crate) fn same_shape(
     })
 }
 
-/// The parts of a mask of this `value` that are connected by their sides, as `[row, column]`.
+/// The regions of the mask with this `value` that are connected by the sides of their pixels, as
+/// `[row, column]`.
 pub(crate) fn parts(mask: ArrayView2<'_, bool>, value: bool) -> Vec<Vec<[usize; 2]>> {
     let columns = mask.ncols();
     let mut open: Vec<bool> = mask.iter().map(|m| *m == value).collect();

@@ -1,9 +1,9 @@
-//! Errors, each with what was expected and what was found.
+//! Errors with the expected and the found values.
 
 use tactile_core::{CustomError, InvalidOption};
 use thiserror::Error;
 
-/// Why a surface, a slope field or a set of control points could not be computed.
+/// Why a surface, a slope field or a set of control points cannot be computed.
 ///
 /// ```
 /// use tactile_sfs::{DepthTable, Domain, SfsError};
@@ -15,7 +15,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SfsError {
-    /// The image has no pixel.
+    /// The image has no pixels.
     #[error("the image has no pixels ({rows} rows, {columns} columns)")]
     EmptyImage {
         /// Rows of the image.
@@ -23,23 +23,23 @@ pub enum SfsError {
         /// Columns of the image.
         columns: usize,
     },
-    /// The mask selects no pixel, or no pixel that carries data.
+    /// The mask selects no pixels, or no pixels with data.
     #[error("the mask selects no usable pixel")]
     EmptyMask,
-    /// Two inputs of one call differ in shape.
+    /// Two inputs of one call have different shapes.
     #[error("the {input} has shape {found:?} but {expected:?} (rows, columns) is needed")]
     ShapeMismatch {
-        /// The input whose shape is wrong.
+        /// The input with the wrong shape.
         input: &'static str,
-        /// Rows and columns needed.
+        /// Expected rows and columns.
         expected: [usize; 2],
-        /// Rows and columns found.
+        /// Found rows and columns.
         found: [usize; 2],
     },
-    /// An option outside its range.
+    /// An option is outside its range.
     #[error(transparent)]
     InvalidOption(#[from] InvalidOption),
-    /// A stage of a user's own failed.
+    /// A user-defined stage failed.
     #[error(transparent)]
     Custom(CustomError),
     /// The contact of a calibration press is as large as the ball, or its radius is not finite.
@@ -53,23 +53,24 @@ pub enum SfsError {
         /// Radius of the ball in metres.
         ball_radius_m: f64,
     },
-    /// The light comes from behind the surface or grazes it (z ≤ 0): no shading carries shape then.
+    /// The light comes from behind the surface or grazes it (z ≤ 0). The shading then contains no
+    /// information on the shape.
     #[error(
         "the light direction ({x}, {y}, {z}) does not come from the viewer's side (z must be \
          positive)"
     )]
     LightFromBelow {
-        /// x of the direction found.
+        /// x of the given direction.
         x: f64,
-        /// y of the direction found.
+        /// y of the given direction.
         y: f64,
-        /// z of the direction found.
+        /// z of the given direction.
         z: f64,
     },
     /// The eikonal equation needs at least one height to start from.
     #[error("no height is known: give known heights or a height at the boundary")]
     NoKnownHeight,
-    /// A slope is NaN or infinite where the integrator cannot skip it.
+    /// A slope is NaN or infinite, and the integrator cannot leave it out.
     #[error(
         "the slope at row {row}, column {column} is not finite; a masked integrator can leave it \
          out"
@@ -80,16 +81,16 @@ pub enum SfsError {
         /// Column of the slope.
         column: usize,
     },
-    /// A calibration table is shorter than two entries.
+    /// A calibration table has fewer than two entries.
     #[error("a calibration table needs at least 2 entries, found {found}")]
     TableTooShort {
-        /// Entries found.
+        /// Number of entries.
         found: usize,
     },
     /// A calibration table is not sorted or not finite.
     #[error("entry {index} of the calibration table is not finite or does not increase")]
     TableNotIncreasing {
-        /// Index of the offending entry.
+        /// Index of the invalid entry.
         index: usize,
     },
     /// A calibration table does not determine the depth at zero signal.
@@ -99,33 +100,33 @@ pub enum SfsError {
          range (0.010 is allowed)"
     )]
     TableZero {
-        /// Entries above the threshold of contact.
+        /// Number of entries above the threshold of contact.
         entries: usize,
         /// Root mean square of the distances to the parabola over the range of the depths.
         misfit: f64,
     },
-    /// More control points were asked for than the surface has pixels.
+    /// More control points were requested than the surface has pixels.
     #[error(
         "{requested} control points asked for, but the surface has only {available} usable pixels"
     )]
     TooManyPoints {
-        /// Points asked for.
+        /// Requested points.
         requested: usize,
-        /// Pixels available.
+        /// Available pixels.
         available: usize,
     },
-    /// Too little data to estimate a parameter.
+    /// Too few data to estimate a parameter.
     #[error("{available} usable pixels are too few, {needed} are needed")]
     TooFewPixels {
-        /// Pixels needed.
+        /// Required pixels.
         needed: usize,
-        /// Pixels found.
+        /// Available pixels.
         available: usize,
     },
 }
 
 impl SfsError {
-    /// The failure of a stage of a user's own, from an error or a message.
+    /// The failure of a user-defined stage, from an error or a message.
     ///
     /// ```
     /// use tactile_sfs::SfsError;

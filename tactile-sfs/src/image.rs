@@ -1,10 +1,11 @@
-//! Image input: floats, or the bytes of an 8-bit camera read in place, and the domain.
+//! Image input: floating-point values, or the bytes of an 8-bit camera read in place, with their
+//! domain.
 
 use ndarray::ArrayView2;
 
 use crate::{Domain, PixelScalar};
 
-/// What a surface is reconstructed from: the values of the pixels, and where they lie.
+/// Input of a reconstruction: the values of the pixels and their domain.
 ///
 /// ```
 /// use ndarray::array;
@@ -25,7 +26,7 @@ pub struct Image<'v, 'd, T> {
 }
 
 impl<'v, 'd, T> Image<'v, 'd, T> {
-    /// Values on a domain, whose shapes the reconstruction compares.
+    /// Values on a domain. The reconstruction checks that their shapes agree.
     pub fn new(values: impl Into<Frame<'v, T>>, domain: Domain<'d, T>) -> Self {
         Self {
             values: values.into(),
@@ -40,7 +41,7 @@ impl<'v, 'd, T> Image<'v, 'd, T> {
 /// use ndarray::array;
 /// use tactile_sfs::Frame;
 /// let bytes = array![[0_u8, 128, 255]];
-/// let frame = Frame::<f32>::Bytes(bytes.view()); // read in place, not rescaled
+/// let frame = Frame::<f32>::Bytes(bytes.view()); // read in place, without rescaling
 /// assert!(matches!(frame, Frame::Bytes(view) if view[[0, 2]] == 255));
 /// let real = array![[0.0_f32, 0.5]];
 /// assert!(matches!(real.view().into(), Frame::Real(view) if view[[0, 1]] == 0.5_f32));

@@ -1,8 +1,8 @@
-//! Surfaces from one image, on a [`Domain`] (mask, pixel size, known heights).
+//! Surfaces from a single image, on a [`Domain`] (mask, pixel size, known heights).
 //!
-//! Images are indexed `[row, column]`. Here x is the column, y the row, z points to the viewer. A
-//! pixel's coordinate is its centre. Slopes are p = ∂z/∂x and q = ∂z/∂y. See [`Lighting`] for the
-//! sign of the light's direction.
+//! Images are indexed `[row, column]`. The axis x runs along columns, y along rows, and z points to
+//! the viewer. Coordinates of a pixel are those of its centre. Slopes are p = ∂z/∂x and q = ∂z/∂y.
+//! See [`Lighting`] for the sign of the direction of the light.
 //!
 #![doc = include_str!("../README.md")]
 //!
@@ -15,10 +15,10 @@
 //! - Slopes to heights, Poisson: $\Delta z = \partial p/\partial x + \partial q/\partial y$. By
 //!   cosine transform O(N log N), error $O(h^4)$.
 //! - Frankot–Chellappa: $\hat Z = -i (u \hat P + v \hat Q)/(u^2 + v^2)$, periodic. O(N log N).
-//! - Tsai–Shah: a damped Newton step $z - K f(z)$ on $f = R - n \cdot s$, pixel by pixel. O(N) an
+//! - Tsai–Shah: a damped Newton step $z - K f(z)$ on $f = R - n \cdot s$, pixel by pixel. O(N) per
 //!   iteration.
 //!
-//! Errors are [`SfsError`]. Not converging is a [`SurfaceReport`].
+//! Errors are [`SfsError`]. A lack of convergence is not an error: see [`SurfaceReport`].
 #![forbid(unsafe_code)]
 
 mod ball;

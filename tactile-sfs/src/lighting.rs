@@ -1,25 +1,25 @@
-//! Light, albedo and ambient: the model from slopes to grey levels.
+//! Light, albedo and ambient light: the model from slopes to grey levels.
 
 use crate::{PixelScalar, SfsError};
 use tactile_core::Requirement;
 
-/// Distant light on a Lambertian surface: I = ambient + I₀ · max(0, n·s), with I₀ the light's
-/// intensity times the albedo.
+/// Distant light on a Lambertian surface: I = ambient + I₀ · max(0, n·s), with I₀ the intensity of
+/// the light times the albedo.
 ///
-/// [`Default`] is light from the viewer, ambient 0 and intensity 1 at normal incidence.
+/// [`Default`] is light from the viewer, with ambient 0 and intensity 1 at normal incidence.
 ///
 /// # Convention
 ///
-/// x is the column, y the row (so y points *down* the image), z points from the surface to the
-/// viewer. A surface z(x, y) with slopes p = ∂z/∂x and q = ∂z/∂y has the normal
-/// n = (−p, −q, 1)/√(1 + p² + q²). `direction` points *from the surface to the light*: (1, 0, 1)
-/// is a light to the right of the image, 45° above the surface. It brightens slopes that fall to
-/// the right. Texts whose y points up need the sign of y changed.
+/// The axis x runs along columns, y along rows (so y points *down* the image), and z points from
+/// the surface to the viewer. A surface z(x, y) with slopes p = ∂z/∂x and q = ∂z/∂y has the normal
+/// n = (−p, −q, 1)/√(1 + p² + q²). `direction` points *from the surface to the light*: (1, 0, 1) is
+/// a light to the right of the image, 45° above the surface. It brightens slopes that fall to the
+/// right. For formulas whose y axis points up, change the sign of y.
 ///
 /// ```
 /// use tactile_sfs::Lighting;
 /// let light = Lighting::new([1.0, 0.0, 1.0])?.with_normal_intensity(255.0)?;
-/// assert!(light.shade(-0.5, 0.0) > light.shade(0.5, 0.0)); // falling to the right is bright
+/// assert!(light.shade(-0.5, 0.0) > light.shade(0.5, 0.0)); // a fall to the right is brighter
 /// assert_eq!(Lighting::<f64>::default().shade(0.0, 0.0), 1.0);
 /// assert!(Lighting::new([1.0, 0.0, -1.0]).is_err());       // light from below
 /// # Ok::<(), tactile_sfs::SfsError>(())
@@ -43,7 +43,7 @@ impl<T: PixelScalar> Default for Lighting<T> {
 }
 
 impl<T: PixelScalar> Lighting<T> {
-    /// Light from `direction` (any length), ambient 0 and intensity 1 at normal incidence.
+    /// Light from `direction` (of any length), with ambient 0 and intensity 1 at normal incidence.
     ///
     /// # Errors
     /// [`SfsError::InvalidOption`] for a direction that is zero or not finite,
@@ -63,21 +63,21 @@ impl<T: PixelScalar> Lighting<T> {
         })
     }
 
-    /// The intensity that every pixel has without the light.
+    /// Intensity of every pixel without the light.
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] unless finite and not negative.
+    /// [`SfsError::InvalidOption`] for a value that is negative or not finite.
     pub fn with_ambient(self, ambient: T) -> Result<Self, SfsError> {
         Requirement::NonNegative.check("ambient", ambient.as_f64())?;
         Ok(Self { ambient, ..self })
     }
 
-    /// I₀, what the surface facing the light adds to the ambient: 255 for a full-range 8-bit frame.
-    /// Where some part of the surface faces the light, a high quantile of the image (0.995 leaves
-    /// out single bright pixels) less the ambient.
+    /// I₀, the intensity above the ambient of a surface that faces the light: 255 for a full-range
+    /// 8-bit frame. If some part of the surface faces the light, use a high quantile of the image
+    /// minus the ambient. The quantile 0.995 excludes single bright pixels.
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] unless positive and finite.
+    /// [`SfsError::InvalidOption`] for a value that is not positive and finite.
     pub fn with_normal_intensity(self, normal_intensity: T) -> Result<Self, SfsError> {
         Requirement::Positive.check("intensity at normal incidence", normal_intensity.as_f64())?;
         Ok(Self {
@@ -91,7 +91,7 @@ impl<T: PixelScalar> Lighting<T> {
         self.direction
     }
 
-    /// I₀, what the surface facing the light adds to the ambient.
+    /// I₀, the intensity above the ambient of a surface that faces the light.
     pub fn normal_intensity(&self) -> T {
         self.normal_intensity
     }
@@ -101,7 +101,8 @@ impl<T: PixelScalar> Lighting<T> {
         self.direction[0] == T::zero() && self.direction[1] == T::zero()
     }
 
-    /// Reflectance n·s of an intensity, (I − ambient)/I₀: in [0, 1] for a pixel the model explains.
+    /// Reflectance n·s of an intensity, (I − ambient)/I₀. It lies in [0, 1] if the pixel agrees
+    /// with the model.
     pub(crate) fn reflectance(&self, intensity: T) -> T {
         (intensity - self.ambient) / self.normal_intensity
     }
@@ -111,8 +112,8 @@ impl<T: PixelScalar> Lighting<T> {
         self.ambient + self.normal_intensity * reflectance
     }
 
-    /// Intensity of a surface element with slopes p = ∂z/∂x and q = ∂z/∂y. Attached shadows get the
-    /// ambient.
+    /// Intensity of a surface element with slopes p = ∂z/∂x and q = ∂z/∂y. It is the ambient in
+    /// attached shadows.
     ///
     /// ```
     /// use tactile_sfs::Lighting;

@@ -1,14 +1,14 @@
-//! The two float types of images and heights.
+//! The two floating-point types of images and heights.
 
 use num_traits::{Float, FromPrimitive, NumAssign};
 
-/// A float of an image or a surface: `f32` or `f64`.
+/// Floating-point type of an image or a surface: `f32` or `f64`.
 ///
-/// Its bounds are what generic callers may rely on.
+/// Generic callers may rely on its bounds.
 ///
 /// ```
 /// use tactile_sfs::PixelScalar;
-/// /// Metres of a height in pixels, in whatever precision it comes.
+/// /// Converts a height in pixels to metres, in either precision.
 /// fn metres<T: PixelScalar>(height_px: T, pixel_size_m: f64) -> T {
 ///     height_px * T::of(pixel_size_m)
 /// }
@@ -30,7 +30,7 @@ pub trait PixelScalar:
     /// `value` rounded to this type.
     fn of(value: f64) -> Self;
 
-    /// This value as `f64`.
+    /// The value as `f64`.
     fn as_f64(self) -> f64;
 }
 

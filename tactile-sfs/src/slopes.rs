@@ -4,9 +4,9 @@ use ndarray::{Array2, ArrayView2};
 
 use crate::PixelScalar;
 
-/// Slopes p = ∂z/∂x and q = ∂z/∂y: central differences, one-sided next to missing (NaN) heights or
-/// the frame's border. NaN where the height is missing and 0 along an axis without neighbours.
-/// Second order inside, first at borders.
+/// Slopes p = ∂z/∂x and q = ∂z/∂y by central differences, one-sided next to missing (NaN) heights
+/// or the border of the frame. They are NaN at missing heights, and 0 along an axis without
+/// neighbours. Second order inside, first order at borders.
 ///
 /// ```
 /// use ndarray::array;
@@ -29,7 +29,7 @@ pub fn slopes<T: PixelScalar>(
     (p, q)
 }
 
-/// Slopes at a pixel whose height is finite.
+/// Slopes at a pixel with a finite height.
 pub(crate) fn slopes_at<T: PixelScalar>(
     z: ArrayView2<'_, T>,
     [row, column]: [usize; 2],
@@ -43,7 +43,7 @@ pub(crate) fn slopes_at<T: PixelScalar>(
         (None, Some(b)) => (b - here) / step,
         (None, None) => T::zero(),
     };
-    // Index 0 − 1 wraps to a number no array reaches.
+    // 0 − 1 wraps to an index that is beyond every array.
     let x = difference(
         get(row, column.wrapping_sub(1)),
         get(row, column + 1),

@@ -8,7 +8,7 @@ use tactile_core::StopReason;
 use crate::domain::same_shape;
 use crate::{BoundingBox, Domain, PixelScalar, SfsError, SurfaceWorkspace};
 
-/// What happened at one pixel: a set of the constants below.
+/// State of one pixel: a set of the constants below.
 ///
 /// ```
 /// use ndarray::array;
@@ -18,7 +18,7 @@ use crate::{BoundingBox, Domain, PixelScalar, SfsError, SurfaceWorkspace};
 ///     Image::new(array![[5.0, 12.0, f64::NAN]].view(), Domain::new([1e-4, 1e-4])?)
 /// )?;
 /// assert_eq!(surface.flags[[0, 0]], PixelFlags::NONE);
-/// assert!(surface.flags[[0, 1]].contains(PixelFlags::OUT_OF_RANGE)); // the last depth was taken
+/// assert!(surface.flags[[0, 1]].contains(PixelFlags::OUT_OF_RANGE)); // the last depth is used
 /// assert!((PixelFlags::DARK | PixelFlags::UNREACHED).contains(PixelFlags::DARK));
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
@@ -26,20 +26,20 @@ use crate::{BoundingBox, Domain, PixelScalar, SfsError, SurfaceWorkspace};
 pub struct PixelFlags(u8);
 
 impl PixelFlags {
-    /// Nothing to report.
+    /// No flag.
     pub const NONE: Self = Self(0);
-    /// Brighter than the model allows (reflectance above 1). Taken as 1.
+    /// Brighter than the model allows (reflectance above 1). Treated as 1.
     pub const SATURATED: Self = Self(1);
-    /// At or below the ambient: the slope is unbounded. It was cut to the method's limit.
+    /// At or below the ambient: the slope is unbounded and was limited by the method.
     pub const DARK: Self = Self(2);
-    /// The input was NaN or infinite. The pixel was filled in from its neighbours.
+    /// The input was NaN or infinite. The pixel was filled from its neighbours.
     pub const NON_FINITE: Self = Self(4);
     /// No known height reaches the pixel. Its height is NaN.
     pub const UNREACHED: Self = Self(8);
-    /// Outside the range of a calibration. The nearest end was taken.
+    /// Outside the range of a calibration. The nearest end was used.
     pub const OUT_OF_RANGE: Self = Self(16);
 
-    /// Flags of a reflectance that the model does not explain: above 1, below `least`, not finite.
+    /// Flags of a reflectance that disagrees with the model: above 1, below `least`, or not finite.
     pub(crate) fn of_reflectance<T: PixelScalar>(reflectance: T, least: T) -> Self {
         if !reflectance.is_finite() {
             Self::NON_FINITE
@@ -76,7 +76,7 @@ impl BitOrAssign for PixelFlags {
     }
 }
 
-/// One connected part of the solved pixels.
+/// One connected region of the solved pixels.
 ///
 /// ```
 /// use ndarray::{Array2, array};
@@ -97,11 +97,11 @@ pub struct Component<T> {
     pub pixels: usize,
     /// Row and column of its first pixel in reading order.
     pub first: [usize; 2],
-    /// Mean height it was given: 0, or what its known heights demand.
+    /// Its mean height: 0, or the value determined by its known heights.
     pub mean_height: T,
 }
 
-/// How a surface was found.
+/// Report of a reconstruction.
 ///
 /// ```
 /// use ndarray::array;
@@ -110,7 +110,7 @@ pub struct Component<T> {
 /// let (image, domain) = (array![[5.0, 12.0, f64::NAN]], Domain::new([1e-4, 1e-4])?);
 /// let report = table.reconstruct(Image::new(image.view(), domain))?.report;
 /// assert_eq!((report.stop, report.iterations), (StopReason::Direct, 0));
-/// // One pixel is out of range, one has no height.
+/// // One pixel is out of range, and one has no height.
 /// assert_eq!((report.solved, report.flagged), (2, 2));
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
@@ -119,20 +119,20 @@ pub struct Component<T> {
 pub struct SurfaceReport<T> {
     /// Why the method stopped.
     pub stop: StopReason,
-    /// Iterations (sweeps, conjugate-gradient steps, …) done, 0 for direct methods.
+    /// Number of iterations (sweeps, conjugate-gradient steps, …), 0 for direct methods.
     pub iterations: usize,
-    /// Last residual or change, in the unit each method documents.
+    /// Last residual or change, in the unit documented by each method.
     pub residual: T,
-    /// Pixels with a height.
+    /// Number of pixels with a height.
     pub solved: usize,
-    /// Pixels with at least one flag.
+    /// Number of pixels with at least one flag.
     pub flagged: usize,
-    /// Connected parts, where the method determines them (masked least squares).
+    /// Connected regions, if the method determines them (masked least squares).
     pub components: Vec<Component<T>>,
 }
 
 impl<T: Default> Default for SurfaceReport<T> {
-    /// Of a direct method that has solved nothing yet.
+    /// The report of a direct method that has not solved anything yet.
     fn default() -> Self {
         Self {
             stop: StopReason::Direct,
@@ -147,16 +147,16 @@ impl<T: Default> Default for SurfaceReport<T> {
 
 /// Heights over the frame, in the unit of the pixel size.
 ///
-/// `heights` is NaN outside `mask`. When a surface is used again as output, only the rectangle
-/// written last is cleared, so that a small contact in a large frame stays cheap. Heights edited by
-/// hand outside of it stay.
+/// `heights` is NaN outside `mask`. If a surface is reused as output, only the last written
+/// rectangle is cleared, so that the cost of a small contact in a large frame stays low. Heights
+/// that a caller has changed outside that rectangle remain.
 ///
 /// ```
 /// use ndarray::{Array2, array};
 /// use tactile_sfs::{CosinePoisson, Domain, SlopeIntegrator, Surface, SurfaceWorkspace};
 /// let mask = array![[true, true, true, false], [true, true, true, false]];
 /// let (p, q) = (Array2::from_elem((2, 4), 1.0), Array2::zeros((2, 4)));
-/// // Both are used again for every frame.
+/// // Both are reused for every frame.
 /// let (mut workspace, mut surface) = (SurfaceWorkspace::default(), Surface::<f64>::default());
 /// let domain = Domain::default().with_mask(mask.view());
 /// CosinePoisson.integrate_with(&mut workspace, p.view(), q.view(), &domain, &mut surface)?;
@@ -167,20 +167,20 @@ impl<T: Default> Default for SurfaceReport<T> {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Surface<T> {
-    /// Heights z(row, column), NaN where there is none.
+    /// Heights z(row, column), NaN at pixels without a height.
     pub heights: Array2<T>,
     /// Pixels that have a height.
     pub mask: Array2<bool>,
-    /// What happened at each pixel.
+    /// Flags of each pixel.
     pub flags: Array2<PixelFlags>,
-    /// How the heights were found.
+    /// Report of the reconstruction.
     pub report: SurfaceReport<T>,
-    /// The rectangle that holds every pixel with a height or a flag.
+    /// The rectangle that contains every pixel with a height or a flag.
     pub(crate) bounding_box: BoundingBox,
 }
 
 impl<T: Default> Default for Surface<T> {
-    /// No pixel yet, to be filled.
+    /// Without pixels, to be filled.
     fn default() -> Self {
         Self {
             heights: Array2::default((0, 0)),
@@ -193,7 +193,7 @@ impl<T: Default> Default for Surface<T> {
 }
 
 impl<T: PixelScalar> Surface<T> {
-    /// A surface from heights, as a reconstruction of a user's own returns it. Pixels that are not
+    /// Creates a surface from heights, for a user-defined reconstruction. Pixels that are not
     /// finite have no height.
     ///
     /// Flags and report may be set afterwards: `surface.flags[[row, column]] |= PixelFlags::DARK`.
@@ -219,7 +219,7 @@ impl<T: PixelScalar> Surface<T> {
         }
     }
 
-    /// What a method writes with a workspace and a surface of its own.
+    /// The output of a method that is called with a new workspace and a new surface.
     pub(crate) fn made_by(
         method: impl FnOnce(&mut SurfaceWorkspace<T>, &mut Self) -> Result<(), SfsError>,
     ) -> Result<Self, SfsError> {
@@ -228,8 +228,8 @@ impl<T: PixelScalar> Surface<T> {
         Ok(surface)
     }
 
-    /// Where every reconstruction enters: checks the domain against an image of this shape, empties
-    /// the surface for it and returns the mask's box. On an error the surface is left as it was.
+    /// First step of every reconstruction: checks the domain against an image of this shape,
+    /// empties the surface and returns the mask's box. On an error the surface is unchanged.
     pub(crate) fn enter(
         &mut self,
         shape: (usize, usize),
@@ -254,7 +254,7 @@ impl<T: PixelScalar> Surface<T> {
         Ok(area)
     }
 
-    /// The same for the integrators.
+    /// Like `enter`, but for the integrators.
     pub(crate) fn enter_slopes(
         &mut self,
         p: ArrayView2<'_, T>,
@@ -266,7 +266,7 @@ impl<T: PixelScalar> Surface<T> {
         self.enter(p.dim(), domain)
     }
 
-    /// Empties the rectangle written last.
+    /// Clears the last written rectangle.
     fn clear(&mut self) {
         let area = self.bounding_box;
         area.of_mut(self.heights.view_mut()).fill(T::nan());
@@ -291,7 +291,8 @@ impl<T: PixelScalar> Surface<T> {
                 .iter()
                 .map(|&solved| usize::from(solved))
                 .sum::<usize>();
-            // Most rows have no flag. A fold without an early end is computed in wide instructions.
+            // Most rows have no flag. A fold without an early exit is computed with SIMD
+            // instructions.
             let flags = flags.row(r);
             if flags
                 .iter()
@@ -309,7 +310,7 @@ impl<T: PixelScalar> Surface<T> {
     }
 }
 
-/// Gives an array a shape and fills it, in its memory where that is large enough.
+/// Fills an array of the given shape with `value`, and reuses its memory if that is large enough.
 pub(crate) fn fill_shape<V: Copy>(array: &mut Array2<V>, shape: (usize, usize), value: V) {
     let empty = Array2::from_shape_simple_fn((0, 0), || value);
     let (mut memory, _) = core::mem::replace(array, empty).into_raw_vec_and_offset();

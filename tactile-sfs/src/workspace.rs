@@ -1,4 +1,4 @@
-//! Buffers that outlive a call, and the progress callback of long solves.
+//! Buffers that are kept between calls, and the progress callback of long solutions.
 
 use core::ops::ControlFlow;
 
@@ -9,11 +9,10 @@ use crate::PixelScalar;
 type Callback = Box<dyn FnMut(Progress) -> ControlFlow<()> + Send + Sync>;
 
 /// Buffers of every method, kept between calls: a second call of the same size does not allocate.
-/// The factorisation of [`MaskedLeastSquares`](crate::MaskedLeastSquares) alone takes its memory
-/// anew.
+/// The only exception is the factorisation of [`MaskedLeastSquares`](crate::MaskedLeastSquares).
 ///
-/// One workspace serves any of the methods. It may also carry a callback that receives the progress
-/// of iterative solves and may stop them.
+/// One workspace can be used with all methods. It may also contain a callback that receives the
+/// progress of iterative solutions and can stop them.
 ///
 /// ```
 /// use core::ops::ControlFlow;
@@ -26,7 +25,7 @@ type Callback = Box<dyn FnMut(Progress) -> ControlFlow<()> + Send + Sync>;
 /// let mut workspace = SurfaceWorkspace::default();
 /// workspace.on_progress(move |progress: Progress| match send.send(progress) {
 ///     Ok(()) => ControlFlow::Continue(()),
-///     Err(_) => ControlFlow::Break(()), // the receiver is gone
+///     Err(_) => ControlFlow::Break(()), // the receiver no longer exists
 /// });
 /// let image = Array2::from_elem((8, 8), 0.9);
 /// let method = TsaiShah::new(Lighting::default()).with_iterations(20)?;
@@ -58,8 +57,8 @@ impl<T> core::fmt::Debug for SurfaceWorkspace<T> {
 }
 
 impl<T: PixelScalar> SurfaceWorkspace<T> {
-    /// Calls `callback` from time to time during iterative solves. `Break` ends the solve with
-    /// [`StopReason::Cancelled`] and the best answer so far.
+    /// Sets a `callback` that is called from time to time during iterative solutions. `Break` ends
+    /// the solution with [`StopReason::Cancelled`] and the best result so far.
     ///
     /// ```
     /// use core::ops::ControlFlow;
@@ -77,7 +76,7 @@ impl<T: PixelScalar> SurfaceWorkspace<T> {
         self.callback = Some(Box::new(callback));
     }
 
-    /// Calls the callback. `Some(Cancelled)` if it asks to stop.
+    /// Calls the callback. `Some(Cancelled)` if it requests a stop.
     pub(crate) fn report(&mut self, done: usize, total: usize, residual: T) -> Option<StopReason> {
         let callback = self.callback.as_mut()?;
         let progress = Progress::new(done, total).with_residual(residual.as_f64());

@@ -1,9 +1,10 @@
-//! Frankot & Chellappa 1988: projection of the slopes on the integrable ones in the Fourier domain.
+//! Frankot and Chellappa 1988: projection of the slopes onto integrable slopes in the Fourier
+//! domain.
 //!
-//! Ẑ(u, v) = −i (u P̂ + v Q̂)/(u² + v²). The surface is taken as periodic: slopes that do not
-//! vanish at the border wrap round and bend it. Errors of 0.5 instead of 10⁻² are usual then, and
+//! Ẑ(u, v) = −i (u P̂ + v Q̂)/(u² + v²). The surface is assumed to be periodic: slopes that do not
+//! vanish at the border wrap round and bend it. Errors are then typically 0.5 instead of 10⁻², and
 //! [`CosinePoisson`](super::CosinePoisson) is the better choice. For smooth slopes that vanish at
-//! the border it converges faster than any power of h.
+//! the border, the method converges faster than any power of h.
 
 use std::sync::Arc;
 
@@ -16,8 +17,8 @@ use crate::{Domain, PixelScalar, SfsError, Surface, SurfaceWorkspace};
 
 /// Integration by Fourier projection, periodic in both directions.
 ///
-/// With a mask, the bounding box is solved and slopes outside the mask are taken as 0. The mean
-/// height inside the mask is 0, or what the known heights demand. O(N M log(N M)).
+/// With a mask, its bounding box is solved with slopes of 0 outside the mask. The mean height
+/// inside the mask is 0, or agrees with the known heights. O(N M log(N M)).
 ///
 /// ```
 /// use ndarray::Array2;
@@ -26,7 +27,7 @@ use crate::{Domain, PixelScalar, SfsError, Surface, SurfaceWorkspace};
 /// let p = Array2::from_shape_fn((16, 32), |(_, column)| wave * (wave * column as f64).cos());
 /// let surface =
 ///     FrankotChellappa.integrate(p.view(), Array2::zeros((16, 32)).view(), &Domain::default())?;
-/// assert!((surface.heights[[3, 8]] - 1.0).abs() < 1e-12); // sin at a quarter of the period
+/// assert!((surface.heights[[3, 8]] - 1.0).abs() < 1e-12); // the sine at a quarter of the period
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,7 +37,7 @@ pub struct FrankotChellappa;
 #[derive(Default)]
 pub(crate) struct FourierBuffers {
     plans: Option<Plans>,
-    /// p + i q, then its spectrum, then the heights in the real part.
+    /// p + i q, then its spectrum, then the heights as the real part.
     field: Vec<Complex<f64>>,
     lines: Vec<Complex<f64>>,
     scratch: Vec<Complex<f64>>,
@@ -89,7 +90,7 @@ impl<T: PixelScalar> SlopeIntegrator<T> for FrankotChellappa {
     }
 }
 
-/// Columns transformed through the buffer at a time.
+/// Number of columns that are transformed through the buffer at once.
 const LANES: usize = 8;
 
 impl FourierBuffers {
@@ -116,7 +117,7 @@ impl FourierBuffers {
         &self.heights
     }
 
-    /// Two-dimensional transform: rows in place, columns a few at a time through a buffer.
+    /// Two-dimensional transform: rows in place, columns in groups through a buffer.
     fn transform(&mut self, plans: &Plans, [along_y, along_x]: &[Arc<dyn Fft<f64>>; 2]) {
         let &Plans { rows, columns, .. } = plans;
         let scratch = [along_y, along_x].map(|fft| fft.get_inplace_scratch_len());
@@ -140,10 +141,10 @@ impl FourierBuffers {
         }
     }
 
-    /// Replaces the spectrum C of p + i q by that of z.
+    /// Replaces the spectrum C of p + i q by the spectrum of z.
     ///
-    /// P̂(u) = (C(u) + C̄(−u))/2 and Q̂(u) = (C(u) − C̄(−u))/2i. The frequencies u and −u are done
-    /// together.
+    /// P̂(u) = (C(u) + C̄(−u))/2 and Q̂(u) = (C(u) − C̄(−u))/2i. The frequencies u and −u are
+    /// processed together.
     fn project(&mut self, &Plans { rows, columns, .. }: &Plans, [hx, hy]: [f64; 2]) {
         let scale = 1.0 / (rows * columns) as f64;
         for r in 0..rows {
@@ -151,7 +152,7 @@ impl FourierBuffers {
             for c in 0..columns {
                 let i = r * columns + c;
                 let j = (rows - r) % rows * columns + (columns - c) % columns;
-                // Done together with its partner.
+                // Processed together with its partner.
                 if j < i {
                     continue;
                 }
@@ -160,8 +161,8 @@ impl FourierBuffers {
                 let (p, q) = ((here + there).scale(0.5), (here - there).scale(0.5));
                 let q = Complex::new(q.im, -q.re);
                 let square = u * u + v * v;
-                // Frequency 0 is the constant that slopes leave open. The scale undoes the
-                // transforms' factor.
+                // Frequency 0 is the constant that slopes do not determine. The scale removes the
+                // factor of the transforms.
                 let factor = if square > 0.0 { scale / square } else { 0.0 };
                 let sum = (p.scale(u) + q.scale(v)).scale(factor);
                 let z = Complex::new(sum.im, -sum.re);
@@ -172,8 +173,8 @@ impl FourierBuffers {
     }
 }
 
-/// Angular frequency of a coefficient. 0 at the Nyquist frequency, where the derivative of a real
-/// wave vanishes.
+/// Angular frequency of a coefficient. It is 0 at the Nyquist frequency, where the derivative of a
+/// real wave vanishes.
 fn frequency(index: usize, length: usize, step: f64) -> f64 {
     let signed = match (2 * index).cmp(&length) {
         core::cmp::Ordering::Less => index as f64,

@@ -1,12 +1,12 @@
 //! Weighted least squares on a mask of any shape, by a sparse Cholesky factorisation.
 //!
 //! Minimises Σ w_ij (z_j − z_i − h s̄_ij)² over the edges between neighbouring pixels of the mask.
-//! Here s̄ is the mean slope along the edge: of the cubic (at the border: parabola or line) through
-//! the slopes of the pixels in line with it. w_ij is the harmonic mean of the two pixels' weights.
-//! Error O(h⁴) inside. On a full rectangle with equal weights [`CosinePoisson`] solves the same
-//! equations directly, and it is asked to. The border of the mask is free (natural). Connected
-//! parts have nothing to do with each other: each gets mean 0, or is fixed by its own known
-//! heights.
+//! Here s̄ is the mean slope along the edge, of the cubic through the slopes of the pixels in line
+//! with it (at the border a parabola or line). The weight w_ij is the harmonic mean of the weights
+//! of the two pixels. The error is O(h⁴) inside. On a full rectangle with equal weights,
+//! [`CosinePoisson`] solves the same equations directly and is used instead. The border of the mask
+//! is free (natural). Connected regions are independent: each has mean 0, or is fixed by its own
+//! known heights.
 
 use faer::linalg::solvers::Solve;
 use faer::sparse::{SparseColMat, Triplet};
@@ -20,14 +20,14 @@ use crate::{BoundingBox, Domain, PixelFlags, PixelScalar, SfsError, Surface, Sur
 
 /// Weighted least squares integration on a mask.
 ///
-/// Slopes that are NaN or infinite are left out: the edge takes the other pixel's slope alone, or,
-/// if both are missing, a weak zero slope. Such pixels are flagged `NON_FINITE`. Known heights
-/// inside the mask are met exactly, and each connected part without one has mean 0
+/// Slopes that are NaN or infinite are left out: the edge uses the slope of the other pixel, or, if
+/// both are missing, a zero slope of small weight. Such pixels have the flag `NON_FINITE`. Known
+/// heights inside the mask are met exactly, and each connected region without one has mean 0
 /// (`report.components`).
 ///
-/// The equations are solved directly, by a sparse Cholesky factorisation ordered for little fill.
-/// On a full rectangle of n pixels with equal weights and no known height Poisson's equation is
-/// solved instead, in O(n log n).
+/// The equations are solved directly, by a sparse Cholesky factorisation with a fill-reducing
+/// order. On a full rectangle of n pixels with equal weights and without known heights, Poisson's
+/// equation is solved instead, in O(n log n).
 ///
 /// ```
 /// use ndarray::{Array2, array};
@@ -54,14 +54,14 @@ impl<T> Default for MaskedLeastSquares<'_, T> {
 }
 
 impl<'a, T: PixelScalar> MaskedLeastSquares<'a, T> {
-    /// Weight of each pixel's slopes, such as the inverse of their variance. 0, NaN or less leave
-    /// the slopes out.
+    /// Weight of the slopes of each pixel, for example the inverse of their variance. A weight of
+    /// 0, NaN or below 0 excludes the slopes.
     ///
     /// ```
     /// use ndarray::Array2;
     /// use tactile_sfs::{Domain, MaskedLeastSquares, SlopeIntegrator};
     /// let (mut p, mut weights) = (Array2::from_elem((6, 6), 0.5), Array2::from_elem((6, 6), 1.0));
-    /// (p[[2, 3]], weights[[2, 3]]) = (40.0, 0.0); // a false slope, known to be one
+    /// (p[[2, 3]], weights[[2, 3]]) = (40.0, 0.0); // a wrong slope, with weight 0
     /// let method = MaskedLeastSquares::default().with_weights(weights.view());
     /// let surface = method.integrate(p.view(), Array2::zeros((6, 6)).view(), &Domain::default())?;
     /// let z = &surface.heights;
@@ -74,22 +74,22 @@ impl<'a, T: PixelScalar> MaskedLeastSquares<'a, T> {
         }
     }
 
-    /// Whether the fit is Poisson's equation on a rectangle: equal weights, no height known, no
+    /// Whether the fit is Poisson's equation on a rectangle: equal weights, no known height, and no
     /// hole in the mask.
     fn is_poisson(&self, domain: &Domain<'_, T>, area: BoundingBox) -> bool {
         let full = |mask: ArrayView2<'_, bool>| area.of(mask).iter().all(|&inside| inside);
         self.weights.is_none() && domain.known_heights.is_none() && domain.mask.is_none_or(full)
     }
 
-    /// The slope at a pixel and its weight, if it is to be used.
+    /// The slope at a pixel and its weight. `None` if the slope is not used.
     fn usable(&self, slopes: ArrayView2<'_, T>, at: [usize; 2]) -> Option<[f64; 2]> {
         let weight = self.weights.map_or(1.0, |weights| weights[at].as_f64());
         let slope = slopes[at].as_f64();
         (slope.is_finite() && weight > 0.0 && weight.is_finite()).then_some([slope, weight])
     }
 
-    /// Mean slope and weight of the edge between the middle two of four pixels in line, of which
-    /// the others may be missing.
+    /// Mean slope and weight of the edge between the middle two of four pixels in line. The outer
+    /// two may be missing.
     fn edge(
         &self,
         slopes: ArrayView2<'_, T>,
@@ -100,29 +100,29 @@ impl<'a, T: PixelScalar> MaskedLeastSquares<'a, T> {
         match (usable(from), usable(to)) {
             (Some([b, v]), Some([c, w])) => {
                 let mean = match (slope(before), slope(beyond)) {
-                    // Integrals over the edge of the polynomial through the slopes that there are.
+                    // Integrals over the edge of the polynomial through the available slopes.
                     (Some(a), Some(d)) => (13.0 * (b + c) - a - d) / 24.0,
                     (Some(a), None) => (5.0 * c + 8.0 * b - a) / 12.0,
                     (None, Some(d)) => (5.0 * b + 8.0 * c - d) / 12.0,
                     (None, None) => 0.5 * (b + c),
                 };
-                // The harmonic mean is governed by the less certain of the two slopes.
+                // The less certain of the two slopes dominates the harmonic mean.
                 [mean, 2.0 * v * w / (v + w)]
             }
             (Some(one), None) | (None, Some(one)) => one,
-            // So weak that it only bridges the gap, and strong enough to keep the equations far
-            // from singular.
+            // Small enough to do no more than bridge the gap, and large enough for equations that
+            // are far from singular.
             (None, None) => [0.0, 1e-4],
         }
     }
 }
 
-/// The numbers of the unknowns and the equations between them, kept between calls.
+/// The numbering of the unknowns and the equations between them, kept between calls.
 ///
-/// A weighted graph Laplacian: pixels of known height are moved to the right-hand side.
+/// A weighted graph Laplacian: known heights are moved to the right-hand side.
 #[derive(Debug, Default)]
 pub(crate) struct MaskedBuffers {
-    /// Number of the unknown of every pixel of the box, or one of the marks below.
+    /// Number of the unknown of each pixel of the box, or one of the marks below.
     number: Vec<usize>,
     /// Pixels of the unknowns.
     pixels: Vec<[usize; 2]>,
@@ -130,11 +130,11 @@ pub(crate) struct MaskedBuffers {
     rhs: Vec<f64>,
     /// Edges between unknowns: the two numbers and the weight.
     edges: Vec<(usize, usize, f64)>,
-    /// The connected parts of the mask, in the order of their first pixels.
+    /// The connected regions of the mask, in the order of their first pixels.
     parts: Vec<Vec<[usize; 2]>>,
 }
 
-/// Marks of pixels outside the mask, and of known height.
+/// Marks of pixels outside the mask and of pixels with a known height.
 const OUTSIDE: usize = usize::MAX;
 const KNOWN: usize = usize::MAX - 1;
 
@@ -162,7 +162,7 @@ impl<T: PixelScalar> SlopeIntegrator<T> for MaskedLeastSquares<'_, T> {
         }
         if self.is_poisson(domain, area) {
             match CosinePoisson.integrate_with(workspace, p, q, domain, surface) {
-                // The general solver can leave such slopes out.
+                // The general solver can leave out such slopes.
                 Err(SfsError::NonFiniteSlope { .. }) => {}
                 other => {
                     other?;
@@ -188,8 +188,8 @@ impl<T: PixelScalar> SlopeIntegrator<T> for MaskedLeastSquares<'_, T> {
 }
 
 impl<T: PixelScalar> MaskedLeastSquares<'_, T> {
-    /// The equations: heights are in the unit of the pixel size, an edge along x weighs (h_y/h_x)²
-    /// times its own weight.
+    /// Assembles the equations. Heights are in units of the pixel size, and the weight of an edge
+    /// along x is multiplied by (h_y/h_x)².
     fn assemble(
         &self,
         buffers: &mut MaskedBuffers,
@@ -216,7 +216,7 @@ impl<T: PixelScalar> MaskedLeastSquares<'_, T> {
                     continue;
                 };
                 let [slope, weight] = self.edge(slopes[axis], [before[axis], here, next, beyond]);
-                // The squared rise over the step is minimised, scaled by h_y².
+                // The squared slope is minimised, multiplied by h_y².
                 let (step, factor) = [(hx, (hy / hx).powi(2)), (hy, 1.0)][axis];
                 let height = |[row, column]: [usize; 2]| domain.known(row, column).map(T::as_f64);
                 let ends = [from, to].map(|at| (buffers.number_of(at, area), height(at)));
@@ -227,8 +227,8 @@ impl<T: PixelScalar> MaskedLeastSquares<'_, T> {
 }
 
 impl MaskedBuffers {
-    /// Numbers the pixels without a known height, writes the known ones and flags slopes that are
-    /// not finite.
+    /// Numbers the pixels without a known height, writes the known heights, and flags slopes that
+    /// are not finite.
     fn enumerate<T: PixelScalar>(
         &mut self,
         domain: &Domain<'_, T>,
@@ -264,7 +264,7 @@ impl MaskedBuffers {
         self.number[(row - area.row_start) * area.columns() + column - area.column_start]
     }
 
-    /// Adds w (z_j − z_i − rise)² to the fit, of two ends with their numbers and known heights.
+    /// Adds w (z_j − z_i − rise)² to the fit, for two ends with their numbers and known heights.
     fn add(&mut self, [i, j]: [(usize, Option<f64>); 2], weight: f64, rise: f64) {
         for ((end, known), (_, other), sign) in [(i, j, -1.0), (j, i, 1.0)] {
             if known.is_none() {
@@ -272,13 +272,13 @@ impl MaskedBuffers {
                 self.rhs[end] += weight * (sign * rise + other.unwrap_or(0.0));
             }
         }
-        // A known end is no unknown: its height has gone to the right-hand side.
+        // A known height is not an unknown and has been moved to the right-hand side.
         if i.1.is_none() && j.1.is_none() {
             self.edges.push((i.0, j.0, weight));
         }
     }
 
-    /// Finds the connected parts of the mask (four neighbours).
+    /// Finds the connected regions of the mask (four neighbours).
     fn label(&mut self, area: BoundingBox) {
         let (rows, columns) = (area.rows(), area.columns());
         let inside = |(row, column)| self.number[row * columns + column] != OUTSIDE;
@@ -289,13 +289,14 @@ impl MaskedBuffers {
         }
     }
 
-    /// Whether a part holds a known height.
+    /// Whether a region contains a known height.
     fn is_anchored(&self, part: &[[usize; 2]], area: BoundingBox) -> bool {
         part.iter().any(|&at| self.number_of(at, area) == KNOWN)
     }
 
-    /// The heights of the unknowns. A part without a known height is held at height 0 by a spring
-    /// at its first pixel. It exerts no force: the right-hand side of such a part has the sum 0.
+    /// The heights of the unknowns. A region without a known height is held at height 0 by a spring
+    /// at its first pixel. The spring exerts no force, because the right-hand side of such a region
+    /// sums to 0.
     fn solve(&mut self, area: BoundingBox) -> Result<Vec<f64>, SfsError> {
         let n = self.pixels.len();
         if n == 0 {
@@ -305,11 +306,11 @@ impl MaskedBuffers {
             if self.is_anchored(part, area) {
                 continue;
             }
-            // A part of one pixel has no edge.
+            // A region of one pixel has no edge.
             let first = self.number_of(part[0], area);
             let held = &mut self.diagonal[first];
-            // The spring is as stiff as the pixel's edges, which keeps the condition of the
-            // equations.
+            // The spring is as stiff as the edges of the pixel, which preserves the condition of
+            // the equations.
             *held = if *held > 0.0 { 2.0 * *held } else { 1.0 };
         }
         let entry = Triplet::<usize, usize, f64>::new;
@@ -325,7 +326,8 @@ impl MaskedBuffers {
         Ok((0..n).map(|i| heights[(i, 0)]).collect())
     }
 
-    /// Writes the heights, gives parts without a known height the mean 0, and reports all parts.
+    /// Writes the heights, shifts regions without a known height to mean 0, and reports all
+    /// regions.
     fn write_levelled<T: PixelScalar>(&self, heights: &[f64], surface: &mut Surface<T>) {
         let area = surface.bounding_box;
         let unknown = |at| heights.get(self.number_of(at, area)).copied();

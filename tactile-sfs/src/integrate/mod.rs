@@ -1,7 +1,8 @@
-//! Slopes to heights: the trait, its implementations, and the constant of integration.
+//! From slopes to heights: the trait, its implementations, and the constant of integration.
 //!
-//! Heights are solved for in double precision, whatever the type of the slopes: the smallest
-//! eigenvalues of the equations are below single precision in images of usual size.
+//! Heights are computed in double precision, whatever the type of the slopes. In images of usual
+//! size, the smallest eigenvalues of the equations are below the rounding errors of single
+//! precision.
 
 mod fourier;
 mod masked;
@@ -20,16 +21,16 @@ pub(crate) use poisson::PoissonBuffers;
 
 use crate::{BoundingBox, Domain, PixelScalar, SfsError, Surface, SurfaceWorkspace};
 
-/// A way from slopes p = ∂z/∂x and q = ∂z/∂y to heights.
+/// A method of computing heights from slopes p = ∂z/∂x and q = ∂z/∂y.
 ///
-/// Slopes are dimensionless (metres per metre), and heights come out in the unit of the pixel size.
-/// A height is known up to a constant: the mean is 0, unless the domain's known heights fix it.
-/// Object safe. An implementor writes [`integrate`](Self::integrate) alone.
+/// Slopes are dimensionless (metres per metre), and heights have the unit of the pixel size.
+/// Heights are determined up to a constant: the mean is 0 unless the domain has known heights. The
+/// trait is object-safe. Only [`integrate`](Self::integrate) has to be implemented.
 ///
 /// ```
 /// use ndarray::Array2;
 /// use tactile_sfs::{CosinePoisson, Domain, SlopeIntegrator};
-/// // The plane z = 0.3 x − 0.2 y comes back exactly.
+/// // The plane z = 0.3 x − 0.2 y is recovered exactly.
 /// let (p, q) = (Array2::from_elem((5, 7), 0.3), Array2::from_elem((5, 7), -0.2));
 /// let surface = CosinePoisson.integrate(p.view(), q.view(), &Domain::default())?;
 /// let z = &surface.heights;
@@ -41,7 +42,7 @@ pub trait SlopeIntegrator<T: PixelScalar>: Send + Sync {
     /// Integrates slopes p along x and q along y.
     ///
     /// # Errors
-    /// Those of the method: shapes that differ, an empty mask, slopes that it cannot leave out.
+    /// Those of the method: different shapes, an empty mask, or slopes that it cannot leave out.
     fn integrate(
         &self,
         p: ArrayView2<'_, T>,
@@ -49,7 +50,8 @@ pub trait SlopeIntegrator<T: PixelScalar>: Send + Sync {
         domain: &Domain<'_, T>,
     ) -> Result<Surface<T>, SfsError>;
 
-    /// The same into `surface`, with its arrays and the buffers of `workspace` used again.
+    /// Like [`integrate`](Self::integrate), but into `surface`: its arrays and the buffers of
+    /// `workspace` are reused.
     ///
     /// ```
     /// use ndarray::Array2;
@@ -73,7 +75,7 @@ pub trait SlopeIntegrator<T: PixelScalar>: Send + Sync {
     /// ```
     ///
     /// # Errors
-    /// As [`integrate`](Self::integrate).
+    /// Those of [`integrate`](Self::integrate).
     fn integrate_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,
@@ -88,7 +90,7 @@ pub trait SlopeIntegrator<T: PixelScalar>: Send + Sync {
     }
 }
 
-/// Boxed, shared and borrowed integrators.
+/// Implements the trait for boxed, shared and borrowed integrators.
 impl<T: PixelScalar, P: Deref<Target: SlopeIntegrator<T>> + Send + Sync> SlopeIntegrator<T> for P {
     fn integrate(
         &self,
@@ -114,7 +116,7 @@ impl<T: PixelScalar, P: Deref<Target: SlopeIntegrator<T>> + Send + Sync> SlopeIn
 /// Copies a row of a box of slopes, with 0 outside the mask.
 ///
 /// # Errors
-/// [`SfsError::NonFiniteSlope`] inside the mask.
+/// [`SfsError::NonFiniteSlope`] for a slope inside the mask.
 fn load_row<T: PixelScalar>(
     slopes: ArrayView2<'_, T>,
     domain: &Domain<'_, T>,
@@ -141,7 +143,7 @@ fn load_row<T: PixelScalar>(
             *x = if *inside { *x } else { 0.0 };
         }
     }
-    // x · 0 is 0 for finite x alone, and a sum is computed in wide instructions.
+    // x · 0 is 0 only for finite x, and a sum is computed with SIMD instructions.
     let poison: f64 = line.iter().map(|x| x * 0.0).sum();
     if poison == 0.0 {
         return Ok(());
@@ -153,8 +155,8 @@ fn load_row<T: PixelScalar>(
     })
 }
 
-/// Writes heights over the surface's box, row by row, all shifted by a constant: known heights are
-/// met on average, or the mean inside the mask is 0. NaN stands for no height.
+/// Writes heights over the surface's box, row by row, all shifted by one constant. The shift meets
+/// known heights on average, or makes the mean inside the mask 0. NaN stands for a missing height.
 pub(crate) fn write_levelled<T: PixelScalar>(
     heights: &[f64],
     domain: &Domain<'_, T>,

@@ -1,15 +1,15 @@
 //! Poisson's equation with natural (Neumann) borders: cosine transform in one direction,
-//! tridiagonal in the other.
+//! tridiagonal systems in the other.
 //!
-//! Minimises Σ ((z_{c+1} − z_c)/h_x − p̄)² + Σ ((z_{r+1} − z_r)/h_y − q̄)². Here p̄ and q̄ are the
-//! means along the edge between two pixels of the cubic through the slopes of the four pixels in
-//! line with it. The equation is Δ_h z = div_h (p̄, q̄) with zero flux through the frame's border.
-//! (The usual mean of two slopes makes surfaces of second order. Exact rises make them of fourth.)
-//! The cosine transform along x makes one tridiagonal system per frequency: (λ_k − δ_y²) ẑ_k =
-//! f̂_k, with λ_k = (h_y/h_x)² (2 − 2 cos(π k/N)) for k from 0 to N − 1. Error O(h⁴), O(h³) in the
-//! rises at the border. Cost O(N M log N).
+//! Minimises Σ ((z_{c+1} − z_c)/h_x − p̄)² + Σ ((z_{r+1} − z_r)/h_y − q̄)². Here p̄ and q̄ are mean
+//! slopes along the edge between two pixels, of the cubic through the slopes of the four pixels in
+//! line with it. The equation is Δ_h z = div_h (p̄, q̄) with zero flux through the border of the
+//! frame. (The usual mean of two slopes gives surfaces of second order. Exact rises give fourth
+//! order.) The cosine transform along x leaves one tridiagonal system per frequency: (λ_k − δ_y²)
+//! ẑ_k = f̂_k, with λ_k = (h_y/h_x)² (2 − 2 cos(π k/N)) for k from 0 to N − 1. The error is O(h⁴),
+//! and O(h³) for the rises at the border. The cost is O(N M log N).
 //!
-//! Only one direction is transformed, because a tridiagonal solve is cheaper than a transform.
+//! Only one direction is transformed, because a tridiagonal solution is cheaper than a transform.
 
 use std::sync::Arc;
 
@@ -20,12 +20,12 @@ use rustfft::{Fft, FftPlanner};
 use super::{SlopeIntegrator, load_row, write_levelled};
 use crate::{BoundingBox, Domain, PixelScalar, SfsError, Surface, SurfaceWorkspace};
 
-/// Poisson integration over the whole rectangle by a cosine transform and tridiagonal solves.
+/// Poisson integration over the whole rectangle by a cosine transform and tridiagonal systems.
 ///
-/// With a mask, the bounding box is solved and slopes outside the mask are taken as 0 (flat where
-/// nothing touches). For a free border along the mask use
-/// [`MaskedLeastSquares`](super::MaskedLeastSquares). The mean height inside the mask is 0, or what
-/// the known heights demand (one shift for all).
+/// With a mask, its bounding box is solved with slopes of 0 outside the mask (no contact, flat
+/// surface). For a free border along the mask use
+/// [`MaskedLeastSquares`](super::MaskedLeastSquares). The mean height inside the mask is 0, or one
+/// shift of all heights makes it agree with the known heights.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -33,7 +33,7 @@ use crate::{BoundingBox, Domain, PixelScalar, SfsError, Surface, SurfaceWorkspac
 /// let p = Array2::from_shape_fn((8, 9), |(_, column)| 2.0 * column as f64);
 /// let surface =
 ///     CosinePoisson.integrate(p.view(), Array2::zeros((8, 9)).view(), &Domain::default())?;
-/// // z = x²: rises are exact for slopes up to cubic ones.
+/// // z = x²: rises are exact for slopes up to cubic polynomials.
 /// assert!((surface.heights[[3, 8]] - surface.heights[[3, 0]] - 64.0).abs() < 1e-10);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
@@ -45,19 +45,20 @@ pub struct CosinePoisson;
 pub(crate) struct PoissonBuffers {
     transform: Option<CosineTransform>,
     pivots: Vec<[f64; LANES]>,
-    /// A row of slopes along x, and a ring of four rows of those along y.
+    /// A row of slopes along x, and a ring buffer of four rows of slopes along y.
     p: Vec<f64>,
     q: [Vec<f64>; 4],
-    /// Right-hand side, spectrum and heights in turn. A row of zeros is added to an odd number.
+    /// Right-hand side, then spectrum, then heights. A row of zeros is appended to an odd number of
+    /// rows.
     grid: Vec<f64>,
 }
 
 /// The cosine transform X_k = Σ x_n cos(π k (2n + 1)/(2N)) of two rows of length N by one complex
 /// Fourier transform.
 ///
-/// The samples in the order 0, 2, 4, … 5, 3, 1 have the Fourier transform V with
-/// X_k = Re(e^(−iπk/(2N)) V_k) (Makhoul, IEEE Trans. ASSP 28(1), 1980). The second row is the
-/// imaginary part: three quarters of the time of a transform per row.
+/// The samples in the order 0, 2, 4, … 5, 3, 1 have the Fourier transform V with X_k =
+/// Re(e^(−iπk/(2N)) V_k) (Makhoul, IEEE Trans. ASSP 28(1), 1980). The second row is the imaginary
+/// part, which saves a quarter of the time per row.
 struct CosineTransform {
     forward: Arc<dyn Fft<f64>>,
     inverse: Arc<dyn Fft<f64>>,
@@ -88,7 +89,7 @@ impl CosineTransform {
         }
     }
 
-    /// Place of a sample in the reordered line.
+    /// Position of a sample in the reordered line.
     fn place(&self, sample: usize) -> usize {
         let half = sample / 2;
         if sample.is_multiple_of(2) {
@@ -110,7 +111,7 @@ impl CosineTransform {
         for (k, twiddle) in self.twiddles.iter().enumerate() {
             // The transforms of the two rows are (V_k + V̄_−k)/2 and (V_k − V̄_−k)/2i.
             let (here, there) = (self.line[k], self.line[(n - k) % n].conj());
-            // The transform of two real rows separates by its symmetry in frequency.
+            // The symmetry in frequency separates the transforms of two real rows.
             a[k] = 0.5 * (twiddle * (here + there)).re;
             b[k] = 0.5 * (twiddle * (here - there)).im;
         }
@@ -121,7 +122,7 @@ impl CosineTransform {
         let n = self.line.len();
         self.line[0] = Complex::new(a[0], b[0]);
         for k in 1..n {
-            // The inverse of the separation above, with the two rows again as real and imaginary
+            // The inverse of the separation above: the two rows become the real and the imaginary
             // part.
             let both = Complex::new(a[k] + b[n - k], b[k] - a[n - k]);
             self.line[k] = self.twiddles[k].conj() * both;
@@ -135,8 +136,8 @@ impl CosineTransform {
     }
 }
 
-/// Columns of the spectrum that are solved together: a block of 1000 rows stays in the second-level
-/// cache.
+/// Number of columns of the spectrum that are solved together: a block of 1000 rows fits in the
+/// second-level cache.
 const LANES: usize = 16;
 
 impl<T: PixelScalar> SlopeIntegrator<T> for CosinePoisson {
@@ -170,7 +171,8 @@ impl<T: PixelScalar> SlopeIntegrator<T> for CosinePoisson {
 }
 
 impl PoissonBuffers {
-    /// Fills the grid with h_y² div_h: the difference of the rises on both sides of each pixel.
+    /// Fills the grid with h_y² div_h: the difference between the rises on both sides of each
+    /// pixel.
     fn load<T: PixelScalar>(
         &mut self,
         p: ArrayView2<'_, T>,
@@ -199,7 +201,7 @@ impl PoissonBuffers {
             if row + 2 < rows {
                 load_row(q, domain, area, row + 2, &mut self.q[(row + 2) % 4])?;
             }
-            // Lines beyond the ends have weight 0, whatever the ring holds there.
+            // Lines beyond the ends have weight 0, whatever the ring buffer contains there.
             let weights = edge_weights(row, rows).map(|weight| hy * weight);
             let [before, here, after, beyond] = [3, 0, 1, 2].map(|k| &self.q[(row + k) % 4]);
             let (above, below) = self.grid[row * columns..].split_at_mut(columns);
@@ -237,18 +239,20 @@ impl PoissonBuffers {
         self.transform = Some(transform);
     }
 
-    /// Thomas's algorithm for a block of columns: (λ − δ²) z = −f/N, whose factor inverts the
+    /// Thomas's algorithm for a block of columns: (λ − δ²) z = −f/N. The factor 1/N inverts the
     /// transforms.
     ///
-    /// The diagonal is λ plus the number of neighbours, beside it stands −1. System 0 is singular.
-    /// Its last pivot is taken as 1, which fixes the constant that is shifted away later.
+    /// The diagonal is λ plus the number of neighbours, and the off-diagonal elements are −1.
+    /// System 0 is singular. Its last pivot is taken as 1, which fixes the constant that is removed
+    /// later.
     fn solve_columns(&mut self, left: usize, rows: usize, columns: usize, aspect2: f64) {
         let lanes = LANES.min(columns - left);
         let scale = -1.0 / columns as f64;
         let mut lambda = [1.0; LANES];
         for (lane, lambda) in lambda.iter_mut().enumerate().take(lanes) {
             let angle = core::f64::consts::PI * (left + lane) as f64 / (2 * columns) as f64;
-            // 4 sin²(x/2) for 2 − 2 cos x, which cancels at low frequencies.
+            // 4 sin²(x/2) instead of 2 − 2 cos x, which suffers from cancellation at low
+            // frequencies.
             *lambda = aspect2 * 4.0 * angle.sin().powi(2);
         }
         let (mut pivot, mut carry) = ([0.0; LANES], [0.0; LANES]);
@@ -259,7 +263,7 @@ impl PoissonBuffers {
                 line.iter_mut().zip(&mut carry).zip(&mut pivot).zip(lambda)
             {
                 let sum = scale * *x + *pivot * *carry;
-                // What decays towards subnormal numbers, which are slow, is 0.
+                // Values that decay towards subnormal numbers, which are slow, are set to 0.
                 *carry = if sum.abs() < 1e-290 { 0.0 } else { sum };
                 *x = *carry;
                 *pivot = (lambda + neighbours - *pivot).recip();
@@ -283,8 +287,8 @@ impl PoissonBuffers {
 }
 
 /// Weights of the slopes at −1, 0, 1 and 2 whose sum is the mean slope from pixel 0 to pixel 1, for
-/// the edge after pixel `edge` of a line of `n`. It is the integral of the cubic through the four,
-/// of a parabola at the ends.
+/// the edge after pixel `edge` of a line of `n`. The mean slope is the integral of the cubic
+/// through the four slopes, or of a parabola at the ends.
 fn edge_weights(edge: usize, n: usize) -> [f64; 4] {
     let weights = match (edge, n) {
         (_, 2) => [0.0, 12.0, 12.0, 0.0],
@@ -298,12 +302,12 @@ fn edge_weights(edge: usize, n: usize) -> [f64; 4] {
 /// Adds the divergence along a line of slopes, times `scale`.
 fn add_rises(p: &[f64], scale: f64, out: &mut [f64]) {
     let n = p.len();
-    // Inside, the difference of the rises on both sides of a pixel is one sum over the five around
-    // it.
+    // Inside the line, the difference between the rises on both sides of a pixel is one sum over
+    // five pixels.
     for (out, p) in out.iter_mut().skip(2).zip(p.windows(5)) {
         *out += scale / 24.0 * (14.0 * (p[3] - p[1]) - (p[4] - p[0]));
     }
-    // The two pixels at either end are touched by the edges there, the windows by none of them.
+    // Only the edges at an end contribute to its last two pixels, and no window of five does.
     let ends = |pixel: usize| pixel < 2 || pixel + 2 >= n;
     for edge in (0..n.saturating_sub(1)).filter(|&edge| ends(edge) || ends(edge + 1)) {
         let weights = edge_weights(edge, n);

@@ -1,15 +1,15 @@
-//! Calibrated intensity → depth: a table read off one known indenter.
+//! Calibrated conversion of intensity to depth, by a table measured on a known indenter.
 //!
-//! Each pixel's signal (a grey level, or its darkening or brightening against a reference image) is
-//! looked up in a calibrated table, linearly between the entries. No neighbour is involved, so
-//! nothing accumulates. It needs a calibration and even illumination.
+//! The signal of each pixel (a grey level, or its difference from a reference image) is converted
+//! by a calibrated table with linear interpolation. Pixels are independent of their neighbours, so
+//! that errors do not accumulate. The method needs a calibration and even illumination.
 //!
-//! A table calibrated on a ball counts depth from the contact circle. That circle is where the
-//! signal crossed a threshold, often with its radius rounded to a pixel. The surface is already
-//! pressed down there: at the rim of a cap of radius R one pixel h of the contact radius a is h
-//! a/√(R² − a²) of depth, everywhere. The signal has a zero of its own, the frame that equals its
-//! reference. Depth is smooth in the signal, so [`DepthTable::zeroed`] reads off the table how deep
-//! its zero lies.
+//! A table calibrated on a ball counts depth from the contact circle. At that circle the signal
+//! crosses a threshold, and its radius is often rounded to a pixel. The surface is already indented
+//! there. With a cap of radius R and a contact radius a, an error of one pixel h in a changes every
+//! depth by h a/√(R² − a²). The signal has a zero of its own: a frame that equals its reference.
+//! Depth is a smooth function of the signal, so [`DepthTable::zeroed`] determines the depth at zero
+//! signal from the table.
 
 use nalgebra::{Matrix3, Vector3};
 use tactile_core::Requirement;
@@ -21,9 +21,8 @@ use crate::{
 
 /// Depth from a calibration table of (signal, depth) pairs.
 ///
-/// Depth is 0 where the signal does not exceed the contact threshold, so that nothing is where
-/// nothing touches. Signals beyond the last entry get the last depth and the flag `OUT_OF_RANGE`.
-/// Cost: O(pixels of the mask's box).
+/// Depth is 0 if the signal does not exceed the contact threshold. Signals above the last entry get
+/// the last depth and the flag `OUT_OF_RANGE`. Cost: O(pixels of the mask's box).
 ///
 /// ```
 /// use ndarray::array;
@@ -42,11 +41,11 @@ pub struct DepthTable<T> {
 }
 
 impl<T: PixelScalar> DepthTable<T> {
-    /// A table of (signal, depth) pairs, both increasing (depths may repeat).
+    /// A table of (signal, depth) pairs. Both must increase, but depths may repeat.
     ///
     /// # Errors
-    /// [`SfsError::TableTooShort`] below two entries, [`SfsError::TableNotIncreasing`] for values
-    /// out of order or NaN.
+    /// [`SfsError::TableTooShort`] for fewer than two entries, [`SfsError::TableNotIncreasing`] for
+    /// values that are out of order or NaN.
     pub fn new(entries: &[(T, T)]) -> Result<Self, SfsError> {
         if entries.len() < 2 {
             return Err(SfsError::TableTooShort {
@@ -68,22 +67,22 @@ impl<T: PixelScalar> DepthTable<T> {
         })
     }
 
-    /// Signals up to `threshold` mean no contact: depth 0.
+    /// Sets the threshold of contact: signals up to `threshold` have depth 0.
     ///
     /// ```
     /// use ndarray::array;
     /// use tactile_sfs::{DepthTable, Domain, Image, SurfaceReconstruction};
     /// let table = DepthTable::new(&[(0.0, 0.0), (10.0, 1e-3)])?
-    ///     .with_contact_threshold(2.0)?; // the camera's noise
+    ///     .with_contact_threshold(2.0)?; // the noise of the camera
     /// let depth = table
     ///     .reconstruct(Image::new(array![[1.5, 5.0]].view(), Domain::new([1e-4, 1e-4])?))?
     ///     .heights;
-    /// assert_eq!(depth, array![[0.0, 0.5e-3]]); // 1.5 is no contact yet
+    /// assert_eq!(depth, array![[0.0, 0.5e-3]]); // 1.5 is below the threshold
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] unless finite and not negative.
+    /// [`SfsError::InvalidOption`] for a threshold that is negative or not finite.
     pub fn with_contact_threshold(self, threshold: T) -> Result<Self, SfsError> {
         Requirement::NonNegative.check("contact threshold", threshold.as_f64())?;
         Ok(Self {
@@ -92,11 +91,11 @@ impl<T: PixelScalar> DepthTable<T> {
         })
     }
 
-    /// Depth of a signal and whether the signal lies within the table.
+    /// Depth of a signal, and whether the signal lies within the table.
     pub fn depth(&self, signal: T) -> (T, bool) {
         let entries = &self.entries;
         let (first, last) = (entries[0], entries[entries.len() - 1]);
-        // Nothing is extrapolated: beyond its ends the table is constant.
+        // There is no extrapolation: the table is constant beyond its ends.
         if signal <= first.0 {
             return (first.1, signal == first.0);
         }
@@ -140,7 +139,8 @@ impl<T: PixelScalar> SurfaceReconstruction<T> for DepthTable<T> {
     ) -> Result<(), SfsError> {
         let Image { values, domain } = image;
         let area = surface.enter(values.dim(), &domain)?;
-        // The table at every level of 8-bit frames: looking it up takes a fifth of the time.
+        // The table at every level of 8-bit frames: a look-up takes a fifth of the time of an
+        // interpolation.
         let levels = matches!(values, Frame::Bytes(_))
             .then(|| core::array::from_fn::<_, 256, _>(|level| self.pixel(T::of(level as f64))));
         for (row, column) in area.pixels() {
@@ -164,20 +164,21 @@ impl<T: PixelScalar> SurfaceReconstruction<T> for DepthTable<T> {
 }
 
 impl<T: PixelScalar> DepthTable<T> {
-    /// The table moved by a constant depth so that zero signal is zero depth.
+    /// The table shifted by a constant depth, so that zero signal has zero depth.
     ///
-    /// A parabola d = c₀ + c₁ s + c₂ s² is fitted, by least squares, to the entries (s, d) above
-    /// the threshold of contact. They become d − c₀ (or 0 where that is negative), and those at or
-    /// below it make way for (0, 0). For signals that are counted from a reference. The threshold,
-    /// to be set before
-    /// ([`with_contact_threshold`](Self::with_contact_threshold)), should be a tenth of the largest
-    /// signal or less: the parabola is extended from there to zero. Depth must be smooth in the
-    /// signal there. Of light that goes as the power 0.8 or 1.2 of the depth the zero is off by 3
-    /// or 4 % of the range, which the table does not show. O(entries).
+    /// A parabola d = c₀ + c₁ s + c₂ s² is fitted by least squares to the entries (s, d) above the
+    /// threshold of contact. These entries become d − c₀ (or 0 if that is negative), and the
+    /// entries at or below the threshold are replaced by (0, 0). The signals must be differences
+    /// from a reference. Set the threshold first
+    /// ([`with_contact_threshold`](Self::with_contact_threshold)), to a tenth of the largest signal
+    /// or less, because the parabola is extrapolated from there to zero. Depth must be a smooth
+    /// function of the signal in that range. If the light is proportional to the power 0.8 or 1.2
+    /// of the depth, the zero is wrong by 3 or 4 % of the range, which the table does not reveal.
+    /// O(entries).
     ///
     /// ```
     /// use tactile_sfs::DepthTable;
-    /// // A level is 30 µm deep. The makers counted depth from the contact's rim, at three levels.
+    /// // A level is 30 µm of depth. The calibration counted depth from the rim, at three levels.
     /// let entries: Vec<_> = (3..60).map(|s| (f64::from(s), 30e-6 * f64::from(s - 3))).collect();
     /// let table = DepthTable::new(&entries)?.with_contact_threshold(3.0)?;
     /// assert!((table.depth(40.0).0 - 1.11e-3).abs() < 1e-12);
@@ -186,8 +187,8 @@ impl<T: PixelScalar> DepthTable<T> {
     /// ```
     ///
     /// # Errors
-    /// [`SfsError::TableZero`] for fewer than four entries above the threshold, or where the
-    /// parabola misses them by more than 1 % of their range (root mean square).
+    /// [`SfsError::TableZero`] for fewer than four entries above the threshold, or if the root mean
+    /// square residual of the parabola exceeds 1 % of the range of the entries.
     pub fn zeroed(mut self) -> Result<Self, SfsError> {
         let kept: Vec<(f64, f64)> = self
             .entries
@@ -196,7 +197,7 @@ impl<T: PixelScalar> DepthTable<T> {
             .map(|(signal, depth)| (signal.as_f64(), depth.as_f64()))
             .collect();
         let zero = depth_at_zero(&kept)?;
-        // A depth below that of no signal would be noise of the fit.
+        // A depth below that of zero signal would be noise of the fit.
         let moved = |&(s, d): &(f64, f64)| (T::of(s), T::of((d - zero).max(0.0)));
         self.entries = vec![(T::zero(), T::zero())];
         self.entries.extend(kept.iter().map(moved));
@@ -204,8 +205,8 @@ impl<T: PixelScalar> DepthTable<T> {
     }
 }
 
-/// Depth of the fitted parabola at signal zero. Entries increase in signal, so the range is
-/// positive for two or more.
+/// Depth of the fitted parabola at signal zero. The signals of entries increase, so that the range
+/// is positive for two or more entries.
 fn depth_at_zero(entries: &[(f64, f64)]) -> Result<f64, SfsError> {
     let unfit = |misfit| SfsError::TableZero {
         entries: entries.len(),
@@ -214,19 +215,19 @@ fn depth_at_zero(entries: &[(f64, f64)]) -> Result<f64, SfsError> {
     let (Some(first), Some(last)) = (entries.first(), entries.last()) else {
         return Err(unfit(0.0));
     };
-    // One more than a parabola passes through.
+    // One more than the number of points that determine a parabola.
     if entries.len() < 4 {
         return Err(unfit(0.0));
     }
-    // Signals and depths in parts of their largest values keep the normal equations' condition that
-    // of the table's shape.
+    // With signals and depths scaled by their largest values, the condition of the normal equations
+    // depends only on the shape of the table.
     let (scale, range) = (last.0, last.1 - first.1);
     let row = |signal: f64| {
         let x = signal / scale;
         Vector3::new(1.0, x, x * x)
     };
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    // Depths count from the first entry, which removes their common offset from the sums.
+    // Depths are counted from the first entry, which removes their common offset from the sums.
     for &(signal, depth) in entries {
         normal += row(signal) * row(signal).transpose();
         right += row(signal) * (depth - first.1);
@@ -236,7 +237,7 @@ fn depth_at_zero(entries: &[(f64, f64)]) -> Result<f64, SfsError> {
         |&(signal, depth): &(f64, f64)| (depth - first.1 - row(signal).dot(&fitted)).powi(2);
     let mean_square = entries.iter().map(square).sum::<f64>() / entries.len() as f64;
     let misfit = mean_square.sqrt();
-    // The one measured table at hand has 0.008. Light that fades exponentially to a seventh has
+    // The one measured table available has 0.008. Light that decays exponentially to a seventh has
     // 0.019, and its zero would be wrong by a twentieth of the range.
     if misfit > 0.01 * range {
         return Err(unfit(misfit / range));

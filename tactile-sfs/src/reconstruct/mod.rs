@@ -1,4 +1,4 @@
-//! One image to heights: the trait and its implementations.
+//! From one image to heights: the trait and its implementations.
 
 mod depth_table;
 mod eikonal;
@@ -15,16 +15,16 @@ use crate::{
     Domain, Frame, Image, Lighting, PixelFlags, PixelScalar, SfsError, Surface, SurfaceWorkspace,
 };
 
-/// A way from one image to a surface.
+/// A method of computing a surface from one image.
 ///
-/// Object safe: `Box<dyn SurfaceReconstruction<f32>>` lets a user pick at run time. An implementor
-/// writes [`reconstruct`](Self::reconstruct) alone.
+/// The trait is object-safe: `Box<dyn SurfaceReconstruction<f32>>` allows a choice at run time.
+/// Only [`reconstruct`](Self::reconstruct) has to be implemented.
 ///
 /// ```
 /// use ndarray::Array2;
 /// use tactile_sfs::{BoundaryCondition, Domain, Eikonal, Image, Lighting, SurfaceReconstruction};
 ///
-/// // A cone of slope 1 has n·s = 1/√2 everywhere.
+/// // A cone of slope 1: n·s = 1/√2 everywhere.
 /// let (size, radius) = (41, 15.0_f64);
 /// let distance = |r: usize, c: usize| (r as f64 - 20.0).hypot(c as f64 - 20.0);
 /// let mask = Array2::from_shape_fn((size, size), |(r, c)| distance(r, c) < radius);
@@ -40,11 +40,12 @@ pub trait SurfaceReconstruction<T: PixelScalar>: Send + Sync {
     /// Reconstructs from an image: real intensities, or the grey levels of an 8-bit camera.
     ///
     /// # Errors
-    /// Those of the method: mostly shapes that differ, an empty mask, or invalid options.
+    /// Those of the method: mostly different shapes, an empty mask, or invalid options.
     fn reconstruct(&self, image: Image<'_, '_, T>) -> Result<Surface<T>, SfsError>;
 
-    /// The same into `surface`, with its arrays and the buffers of `workspace` used again: the
-    /// methods of this crate do not allocate after the first frame of a stream.
+    /// Like [`reconstruct`](Self::reconstruct), but into `surface`: its arrays and the buffers of
+    /// `workspace` are reused. The methods of this crate do not allocate after the first frame of a
+    /// stream.
     ///
     /// ```
     /// use ndarray::array;
@@ -66,7 +67,7 @@ pub trait SurfaceReconstruction<T: PixelScalar>: Send + Sync {
     /// ```
     ///
     /// # Errors
-    /// As [`reconstruct`](Self::reconstruct).
+    /// Those of [`reconstruct`](Self::reconstruct).
     fn reconstruct_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,
@@ -79,7 +80,7 @@ pub trait SurfaceReconstruction<T: PixelScalar>: Send + Sync {
     }
 }
 
-/// Boxed, shared and borrowed methods.
+/// Implements the trait for boxed, shared and borrowed methods.
 impl<T: PixelScalar, P: Deref<Target: SurfaceReconstruction<T>> + Send + Sync>
     SurfaceReconstruction<T> for P
 {
@@ -97,10 +98,10 @@ impl<T: PixelScalar, P: Deref<Target: SurfaceReconstruction<T>> + Send + Sync>
     }
 }
 
-/// The image of a box as reflectance, and the fields that iterate over it.
+/// The image of a box as reflectance, and the fields of the iteration.
 #[derive(Debug, Default)]
 pub(crate) struct FieldBuffers<T> {
-    /// Reflectance in [0, 1]. NaN outside the mask and where the input is not finite.
+    /// Reflectance in [0, 1]. NaN outside the mask and at pixels that are not finite.
     reflectance: Vec<T>,
     /// Heights, their variances and their next values.
     heights: Vec<T>,
@@ -133,7 +134,8 @@ impl<T: PixelScalar> FieldBuffers<T> {
             surface.flags[[row, column]] =
                 PixelFlags::of_reflectance(value, T::min_positive_value());
             usable |= value.is_finite();
-            // No lit normal has a cosine outside 0 to 1. The flags record that the value was cut.
+            // The cosine of a lit normal lies between 0 and 1. The flags record that the value was
+            // clamped.
             let clamped = value.max(T::zero()).min(T::one());
             self.reflectance
                 .push(if value.is_finite() { clamped } else { T::nan() });

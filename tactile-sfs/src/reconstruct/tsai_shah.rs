@@ -1,22 +1,21 @@
 //! Tsai & Shah 1994: Newton's method on the reflectance, pixel by pixel.
 //!
 //! With p = (z − z_left)/h_x and q = (z − z_above)/h_y the residual f(z) = R − (s_z − s_x p − s_y
-//! q)/√(1 + p² + q²) is linearised in the pixel's own height. As printed the method breaks where f′
-//! vanishes (at once under frontal light, where the start z = 0 is stationary), and where slopes
-//! run away. It also breaks along one diagonal, since only left and upper neighbours count. Tamed
-//! here:
+//! q)/√(1 + p² + q²) is linearised in the height of the pixel. The published method fails if f′
+//! vanishes (immediately under frontal light, where the start z = 0 is stationary), and if slopes
+//! diverge. It also fails along one diagonal, because only the left and the upper neighbours are
+//! used. The modifications here are:
 //!
-//! - the step is K = f′ S/(W + f′² S) · f, S the pixel's own variance, which shrinks as (1 − K f′)
-//!   S. This is a Kalman gain instead of 1/f′ (the authors' own remedy), with W as the noise of
-//!   the image.
-//! - slopes used in f and f′ are cut to 5.
-//! - the start is a gently convex paraboloid with the centre and the axes of the mask, not the
-//!   stationary plane.
-//! - the four corners are taken in turn (left/right, above/below), so that no diagonal is
-//!   preferred.
+//! - The step is K = f′ S/(W + f′² S) · f. S is the variance of the pixel, which is reduced to (1 −
+//!   K f′) S. This is a Kalman gain instead of 1/f′ (the remedy of the authors), with W as the
+//!   noise of the image.
+//! - Slopes in f and f′ are limited to 5.
+//! - The start is a slightly convex paraboloid with the centre and the axes of the mask instead of
+//!   the stationary plane.
+//! - The four corners are used in turn (left/right, above/below), so that no diagonal is preferred.
 //!
-//! It is a local method: a few iterations write the fine relief on the start, and the large shape
-//! remains that of the start. The eikonal method is better wherever a height is known.
+//! The method is local: a few iterations add the fine relief to the start, and the large-scale
+//! shape remains that of the start. The eikonal method is better whenever a height is known.
 
 use super::FieldBuffers;
 use crate::integrate::write_levelled;
@@ -29,7 +28,7 @@ use tactile_core::Requirement;
 /// Variance W of the reflectance.
 const NOISE: f64 = 1e-2;
 
-/// Slopes count up to here.
+/// Limit of the slopes.
 const MAX_SLOPE: f64 = 5.0;
 
 /// Slope of the start at the nearest point of its boundary.
@@ -37,8 +36,8 @@ const START_SLOPE: f64 = 0.5;
 
 /// Shape from shading by Newton's method on each pixel.
 ///
-/// Heights are level with known ones on average, or have mean 0. Cost: O(pixels) an iteration.
-/// `report.residual` is the root mean square misfit of the reflectance.
+/// Heights agree with known ones on average, or have mean 0. Cost: O(pixels) per iteration.
+/// `report.residual` is the root mean square residual of the reflectance.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -57,8 +56,8 @@ pub struct TsaiShah<T> {
 }
 
 impl<T: PixelScalar> TsaiShah<T> {
-    /// 12 iterations, noise variance 10⁻², slopes up to 5, a start that falls with slope 0.5 at the
-    /// nearest point of its boundary.
+    /// Creates the method with 12 iterations, noise variance 10⁻², slopes up to 5, and a start that
+    /// falls with slope 0.5 at the nearest point of its boundary.
     pub fn new(lighting: Lighting<T>) -> Self {
         Self {
             lighting,
@@ -66,7 +65,8 @@ impl<T: PixelScalar> TsaiShah<T> {
         }
     }
 
-    /// Number of iterations. More do not make the method converge to the surface.
+    /// Sets the number of iterations. A larger number does not make the method converge to the
+    /// surface.
     ///
     /// # Errors
     /// [`SfsError::InvalidOption`] for 0.
@@ -75,9 +75,9 @@ impl<T: PixelScalar> TsaiShah<T> {
         Ok(Self { iterations, ..self })
     }
 
-    /// z = −½ s a xᵀ(4C)⁻¹x: the paraboloid whose contours are ellipses of the centre and
-    /// covariance C of the pixels that carry data (a uniform ellipse ends at xᵀC⁻¹x = 4). Here s is
-    /// its slope at the ends of the minor half axis a = 2 √λ_min(C).
+    /// z = −½ s a xᵀ(4C)⁻¹x: the paraboloid whose contours are ellipses with the centre and the
+    /// covariance C of the pixels with data (a uniform ellipse ends at xᵀC⁻¹x = 4). Here s is its
+    /// slope at the ends of the minor half axis a = 2 √λ_min(C).
     fn start(field: &mut FieldBuffers<T>, grid: &Grid<T>) {
         let aspect = grid.step[1].as_f64();
         let at = |i: usize| {
@@ -100,8 +100,8 @@ impl<T: PixelScalar> TsaiShah<T> {
             count += 1.0;
         }
         let [cx, cy] = sum.map(|sum| sum / count);
-        // The variance of a pixel's own square keeps masks of one row or column from being
-        // singular.
+        // The variance within a single pixel avoids a singular matrix for masks of one row or
+        // column.
         let (mut xx, mut xy, mut yy) = (1.0 / 12.0, 0.0, aspect * aspect / 12.0);
         for (x, y) in inside() {
             xx += (x - cx) * (x - cx) / count;
@@ -112,7 +112,7 @@ impl<T: PixelScalar> TsaiShah<T> {
         let largest = 0.5 * (xx + yy) + (0.5 * (xx - yy)).hypot(xy);
         let minor = 2.0 * (determinant / largest).sqrt();
         let curvature = -0.5 * START_SLOPE * minor / (4.0 * determinant);
-        // The quadratic form of C⁻¹, whose determinant has gone into the factor.
+        // The quadratic form of C⁻¹, whose determinant is included in the factor.
         for (i, z) in field.heights.iter_mut().enumerate() {
             let (x, y) = (at(i).0 - cx, at(i).1 - cy);
             *z = T::of(curvature * (yy * x * x - 2.0 * xy * x * y + xx * y * y));
@@ -194,10 +194,10 @@ impl<T: PixelScalar> TsaiShah<T> {
         }
     }
 
-    /// One step at every pixel. Returns the root mean square misfit before it.
+    /// One step at every pixel. Returns the root mean square residual before the step.
     fn iterate(&self, field: &mut FieldBuffers<T>, grid: &Grid<T>, iteration: usize) -> T {
         let sign = |back: bool| if back { T::one() } else { -T::one() };
-        // Four iterations take all four corners.
+        // Four iterations use all four corners.
         let back = [iteration & 1 == 0, iteration & 2 == 0];
         let per = [sign(back[0]) / grid.step[0], sign(back[1]) / grid.step[1]];
         let max_slope = T::of(MAX_SLOPE);
@@ -216,7 +216,7 @@ impl<T: PixelScalar> TsaiShah<T> {
             let (f, slope) = self.residual(reflectance, slopes, per);
             let variance = field.variance[i];
             let gain = variance * slope / (T::of(NOISE) + slope * slope * variance);
-            // The variance only falls, so that later iterations change less and less.
+            // The variance only decreases, so that changes become smaller with every iteration.
             field.variance[i] = (T::one() - gain * slope) * variance;
             field.next_heights[i] = z - gain * f;
             sum += f * f;
@@ -225,8 +225,8 @@ impl<T: PixelScalar> TsaiShah<T> {
         (sum / T::of(count.max(1) as f64)).sqrt()
     }
 
-    /// f = R − n·s, and its derivative by the pixel's own height, of which the slopes change by
-    /// `per` each.
+    /// f = R − n·s, and its derivative with respect to the height of the pixel. The slopes change
+    /// by `per` per unit of height.
     #[inline(always)]
     fn residual(&self, reflectance: T, [p, q]: [T; 2], [ax, ay]: [T; 2]) -> (T, T) {
         let [sx, sy, sz] = self.lighting.direction();
@@ -234,12 +234,12 @@ impl<T: PixelScalar> TsaiShah<T> {
         let w = w2.sqrt();
         let cosine = (sz - sx * p - sy * q) / w;
         let slope = (sx * ax + sy * ay) / w + cosine * (p * ax + q * ay) / w2;
-        // The derivative is not cut in attached shadow: it leads the pixel back into the light.
+        // The derivative is not clamped in attached shadow: it moves the pixel back into the light.
         (reflectance - cosine.max(T::zero()), slope)
     }
 }
 
-/// Height of the neighbour before or after along one axis. The pixel's own at the border.
+/// Height of the neighbour before or after along one axis, or of the pixel itself at the border.
 fn neighbour<T: PixelScalar>(
     z: &[T],
     i: usize,

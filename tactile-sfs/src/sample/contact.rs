@@ -1,10 +1,11 @@
-//! Points of a round body that meets a plane: to the sub-pixel contour, and with heights that
-//! follow the vertical boundary.
+//! Control points of a round body that meets a plane: up to the sub-pixel contour, with heights
+//! that follow the vertical boundary.
 //!
 //! Near the boundary z rises as the square root of the distance, and no interpolation of z between
-//! pixels follows it. Its square does: z² = a² − x² − y² for a ball, a smooth function whose zero
-//! is the contour. So squares are continued one pixel beyond the mask, and areas count a pixel by
-//! the part of it inside the contour. Heights between pixels are roots of interpolated squares.
+//! pixels is accurate. The square of z is smooth: z² = a² − x² − y² for a ball, and its zero is the
+//! contour. Therefore squares are extrapolated one pixel beyond the mask, and the area of a pixel
+//! counts by its fraction inside the contour. Heights between pixels are roots of interpolated
+//! squares.
 
 use nalgebra::Point3;
 use ndarray::ArrayView2;
@@ -12,12 +13,11 @@ use ndarray::ArrayView2;
 use super::{ControlPointSampler, SampleBuffers, Weights, made_by};
 use crate::{BoundingBox, Domain, PixelScalar, SfsError, SurfaceWorkspace};
 
-/// Squared slope above which ground counts no steeper (63°), as for
-/// [`EquallySpaced`](super::EquallySpaced).
+/// Upper limit of the squared slope (63°), as for [`EquallySpaced`](super::EquallySpaced).
 const STEEPEST_SQUARED: f64 = 4.0;
 
-/// The eight neighbours (down, right), and the weight of each one's continuation: a diagonal
-/// reaches further.
+/// The eight neighbours (down, right), with the weight of the extrapolation from each: a diagonal
+/// is a longer distance.
 const NEIGHBOURS: [(isize, isize, f64); 8] = [
     (0, 1, 1.0),
     (1, 0, 1.0),
@@ -29,18 +29,18 @@ const NEIGHBOURS: [(isize, isize, f64); 8] = [
     (-1, -1, 0.5),
 ];
 
-/// Equally spaced control points on a round body that meets the plane z = 0 at its contour, as a
-/// contact does. Each stands for the same area of the surface, and cells and heights run to the
-/// contour between the pixels.
+/// Equally spaced control points on a round body that meets the plane z = 0 at its contour, as in a
+/// contact. Each represents the same area of the surface. Cells and heights extend to the contour
+/// between the pixels.
 ///
-/// The points of two loads correspond in contacts of twenty pixels' radius too, where those of
-/// [`EquallySpaced`](super::EquallySpaced) follow the pixels at the boundary. Heights below zero
-/// move the plane down to the lowest. O(pixels of the mask's box).
+/// The points of two loads correspond even in contacts of twenty pixels' radius, whereas those of
+/// [`EquallySpaced`](super::EquallySpaced) follow the pixels at the boundary. With heights below
+/// zero, the plane is lowered to the lowest height. O(pixels of the mask's box).
 ///
 /// ```
 /// use ndarray::Array2;
 /// use tactile_sfs::{ContactSampler, ControlPointSampler, Domain};
-/// // Two balls of 12.0 and 14.4 pixels: the second is the first, a fifth larger.
+/// // Two balls of 12.0 and 14.4 pixels: the second is the first, scaled by 1.2.
 /// let points = |radius: f64| {
 ///     let z = Array2::from_shape_fn((40, 40), |(r, c)| {
 ///         (radius * radius - (r as f64 - 19.7).powi(2) - (c as f64 - 20.2).powi(2))
@@ -110,19 +110,19 @@ impl<T: PixelScalar> ControlPointSampler<T> for ContactSampler {
     }
 }
 
-/// Squared heights over the mask's box and one pixel around it, in squares of a pixel's width. NaN
-/// where unknown.
+/// Squared heights over the mask's box and one pixel around it, in squares of the pixel width. NaN
+/// if unknown.
 struct Field<T> {
     squares: Vec<f64>,
     columns: usize,
     rows: usize,
-    /// Pixel of the frame under the first place, less one.
+    /// Pixel of the frame at the first position, less one.
     area: BoundingBox,
     pixel_size_m: [T; 2],
     aspect: f64,
     /// Height of the plane in pixel widths.
     plane: f64,
-    /// Pixels with a height.
+    /// Number of pixels with a height.
     solved: usize,
 }
 
@@ -137,7 +137,7 @@ impl<T: PixelScalar> Field<T> {
         let [width, height] = domain.pixel_size_m.map(T::as_f64);
         let (rows, columns) = (area.rows() + 2, area.columns() + 2);
         squares.clear();
-        // A row more, which is never filled: what lies above and below the field.
+        // One more row, which is never filled, stands for positions above and below the field.
         squares.resize((rows + 1) * columns, f64::NAN);
         let (mut plane, mut solved) = (0.0_f64, 0);
         let heights = area.of(surface);
@@ -155,8 +155,8 @@ impl<T: PixelScalar> Field<T> {
             }
         }
         for height in &mut squares {
-            // Squares of depths above the plane. Negative heights would otherwise have the squares
-            // of positive ones.
+            // Squares of depths above the plane. Without the shift, negative heights would have the
+            // squares of positive ones.
             *height = (*height - plane).powi(2);
         }
         let mut field = Self {
@@ -173,16 +173,16 @@ impl<T: PixelScalar> Field<T> {
         field
     }
 
-    /// Continues the squares to the pixels next to the mask: those of a ball, whose second
-    /// difference is −2 a pixel squared.
+    /// Extrapolates the squares to the pixels next to the mask like those of a ball, whose second
+    /// difference is −2 per squared pixel.
     ///
-    /// A pixel outside the mask has its middle outside the contour: where the continuation is above
-    /// zero (a cliff at the boundary), the contour is put halfway.
+    /// The centre of a pixel outside the mask lies outside the contour. If the extrapolation is
+    /// above zero there (a cliff at the boundary), the contour is placed half way.
     fn continue_outwards(&mut self, inner: &mut Vec<f64>) {
         inner.clone_from(&self.squares);
         for row in 0..self.rows {
-            // Whether one of a column's three places about this row has a square, for the columns
-            // before, at and after the present one.
+            // Whether one of the three pixels of a column about this row has a square, for the
+            // previous, the present and the next column.
             let is_reached = |column: usize| {
                 (row.saturating_sub(1)..(row + 2).min(self.rows))
                     .any(|row| !inner[row * self.columns + column].is_nan())
@@ -223,7 +223,7 @@ impl<T: PixelScalar> Field<T> {
         }
     }
 
-    /// One of the squares. NaN outside the field.
+    /// One of the squares, or NaN outside the field.
     fn of(&self, squares: &[f64], row: isize, column: isize) -> f64 {
         let inside = row >= 0
             && column >= 0
@@ -236,12 +236,13 @@ impl<T: PixelScalar> Field<T> {
         }
     }
 
-    /// A row of the field, or what lies above and below it.
+    /// A row of the field, or the empty row above and below it.
     fn line(&self, row: usize) -> &[f64] {
         &self.squares[row.min(self.rows) * self.columns..][..self.columns]
     }
 
-    /// Area of the surface over the part of every pixel inside the contour, per area of a pixel.
+    /// Area of the surface over the part of every pixel inside the contour, divided by the area of
+    /// a pixel.
     fn weigh<'a>(&self, weight: &'a mut Vec<f64>) -> Weights<'a> {
         weight.clear();
         let (mut covered, mut filled) = (0.0, 0);
@@ -258,8 +259,8 @@ impl<T: PixelScalar> Field<T> {
                 let along = [beside(column.wrapping_sub(1)), beside(column + 1)];
                 let down = [above[column], below[column]];
                 let (gx, gy) = (difference(here, along), difference(here, down));
-                // The contour crosses the pixel where |square| is below half of what it changes
-                // over the pixel.
+                // The contour crosses the pixel if |square| is below half of its change over the
+                // pixel.
                 let change = (gx.abs() + gy.abs()).max(f64::MIN_POSITIVE);
                 let cover = if here >= 0.5 * change {
                     1.0
@@ -286,7 +287,7 @@ impl<T: PixelScalar> Field<T> {
         }
     }
 
-    /// The point at a place (x, y) of the field. Its height is the root of the bilinear square.
+    /// The point at a position (x, y) of the field. Its height is the root of the bilinear square.
     fn point(&self, [x, y]: [f64; 2]) -> Point3<T> {
         let (left, top) = (x.floor(), y.floor());
         let (right, down) = (x - left, y - top);
@@ -304,7 +305,7 @@ impl<T: PixelScalar> Field<T> {
             }
         }
         let square = if total > 0.0 { sum / total } else { 0.0 };
-        // Beyond the contour the interpolated square is negative, and the point lies in the plane.
+        // Outside the contour the interpolated square is negative, and the point lies in the plane.
         let height = self.plane + square.max(0.0).sqrt();
         let [width_m, height_m] = self.pixel_size_m;
         Point3::new(
@@ -315,7 +316,7 @@ impl<T: PixelScalar> Field<T> {
     }
 }
 
-/// Central difference, or one-sided where a neighbour is missing.
+/// Central difference, or one-sided if a neighbour is missing.
 fn difference(here: f64, [before, after]: [f64; 2]) -> f64 {
     match (before.is_nan(), after.is_nan()) {
         (false, false) => 0.5 * (after - before),

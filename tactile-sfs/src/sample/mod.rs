@@ -1,9 +1,9 @@
 //! Control points on a surface: the trait and its implementations.
 //!
-//! Most of them spread points over the area of the surface on a lattice of its pixels. The surface
-//! is cut into strips of rows, the strips into cells of equal weight, and a point stands in the
-//! centroid of each. Cuts run through nodes: where the surface is the same but larger, or lies
-//! elsewhere between the pixels, the points are the same points of the surface.
+//! Most samplers distribute points over the area of the surface, on a lattice of its pixels. The
+//! surface is divided into strips of rows and the strips into cells of equal weight, with a point
+//! in the centroid of each cell. Cuts may pass through nodes: if the surface is scaled, or shifted
+//! by a fraction of a pixel, the points remain the same points of the surface.
 
 mod contact;
 
@@ -17,13 +17,13 @@ pub use contact::ContactSampler;
 use crate::slopes::slopes_at;
 use crate::{BoundingBox, Domain, PixelScalar, SfsError, SurfaceWorkspace};
 
-/// A way to choose control points on a surface.
+/// A method of choosing control points on a surface.
 ///
-/// Points are (x, y, z) in metres, x = column · width, y = row · height of a pixel. Between pixels
-/// the height is interpolated. None lies outside the mask (for [`ContactSampler`]: outside the
-/// contour) or where the height is not finite, no two coincide, and the same input gives the same
-/// points. Exactly `count` points are returned. Object safe. An implementor writes
-/// [`sample`](Self::sample) alone.
+/// Points are (x, y, z) in metres, with x = column · width and y = row · height of a pixel. Heights
+/// between pixels are interpolated. All points lie inside the mask (for [`ContactSampler`]: inside
+/// the contour) and at finite heights, no two coincide, and equal input gives equal points. Exactly
+/// `count` points are returned. The trait is object-safe. Only [`sample`](Self::sample) has to be
+/// implemented.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -34,8 +34,8 @@ use crate::{BoundingBox, Domain, PixelScalar, SfsError, SurfaceWorkspace};
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 pub trait ControlPointSampler<T: PixelScalar>: Send + Sync {
-    /// Chooses `count` points on `heights` inside the mask of `domain`. Its known heights play no
-    /// part.
+    /// Chooses `count` points on `heights` inside the mask of `domain`. The known heights of the
+    /// domain are not used.
     ///
     /// ```
     /// use ndarray::array;
@@ -46,8 +46,8 @@ pub trait ControlPointSampler<T: PixelScalar>: Send + Sync {
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```
     ///
-    /// # Errors
-    /// Those of a wrong domain ([`Domain::bounding_box`]), and [`SfsError::TooManyPoints`] for more
+    /// Those of an invalid domain ([`Domain::bounding_box`]), and [`SfsError::TooManyPoints`] for
+    /// more points than pixels.
     /// points than pixels.
     fn sample(
         &self,
@@ -56,8 +56,8 @@ pub trait ControlPointSampler<T: PixelScalar>: Send + Sync {
         count: usize,
     ) -> Result<Vec<Point3<T>>, SfsError>;
 
-    /// The same into `points`, whose contents are replaced, with the buffers of `workspace`. The
-    /// samplers of this crate allocate nothing once both have grown.
+    /// Like [`sample`](Self::sample), but into `points`, whose contents are replaced, with the
+    /// buffers of `workspace`. The samplers of this crate do not allocate once both have grown.
     ///
     /// ```
     /// use ndarray::Array2;
@@ -81,7 +81,7 @@ pub trait ControlPointSampler<T: PixelScalar>: Send + Sync {
     /// ```
     ///
     /// # Errors
-    /// As [`sample`](Self::sample). `points` is then empty.
+    /// Those of [`sample`](Self::sample). `points` is then empty.
     fn sample_with(
         &self,
         workspace: &mut SurfaceWorkspace<T>,
@@ -97,7 +97,7 @@ pub trait ControlPointSampler<T: PixelScalar>: Send + Sync {
     }
 }
 
-/// Boxed, shared and borrowed samplers.
+/// Implements the trait for boxed, shared and borrowed samplers.
 impl<T: PixelScalar, P: Deref<Target: ControlPointSampler<T>> + Send + Sync> ControlPointSampler<T>
     for P
 {
@@ -122,7 +122,7 @@ impl<T: PixelScalar, P: Deref<Target: ControlPointSampler<T>> + Send + Sync> Con
     }
 }
 
-/// The points that a method finds with a workspace of its own.
+/// The points that a method finds with a new workspace.
 fn made_by<T: PixelScalar>(
     method: impl FnOnce(&mut SurfaceWorkspace<T>, &mut Vec<Point3<T>>) -> Result<(), SfsError>,
 ) -> Result<Vec<Point3<T>>, SfsError> {
@@ -136,26 +136,26 @@ fn made_by<T: PixelScalar>(
 pub(crate) struct SampleBuffers {
     /// Squared heights.
     squares: Vec<f64>,
-    /// Weights of the lattice's nodes.
+    /// Weights of the nodes of the lattice.
     weight: Vec<f64>,
     strips: Strips,
     pixels: Vec<[usize; 2]>,
 }
 
-/// Equally spaced control points: each stands for the same area of the surface (not of its
-/// projection). Ground steeper than 2 (63°) counts as that steep: the area of a rim depends on the
-/// pixels it falls on.
+/// Equally spaced control points: each represents the same area of the surface (not of its
+/// projection). Slopes above 2 (63°) count as 2, because the area of a rim depends on the positions
+/// of the pixels.
 ///
-/// The surface is cut into strips of rows and the strips into cells of equal area, with a point in
-/// the centroid of each. Cuts and centroids are to a fraction of a pixel: the same surface, larger
-/// or shifted, gives the same points of it, so that the points of two loads correspond. Areas are
-/// measured on 100 pixels a point or more, where there are as many. Deterministic. O(count), and
-/// O(pixels) for the mask's box.
+/// The surface is divided into strips of rows and the strips into cells of equal area, with a point
+/// in the centroid of each cell. Cuts and centroids are accurate to a fraction of a pixel: a scaled
+/// or shifted surface has the same points, so that the points of two loads correspond. Areas are
+/// measured on at least 100 pixels per point, if there are enough pixels. The result is
+/// deterministic. O(count), and O(pixels) for the mask's box.
 ///
 /// ```
 /// use ndarray::Array2;
 /// use tactile_sfs::{ControlPointSampler, Domain, EquallySpaced};
-/// // Level on the left, a roof of slope √3 on the right: twice the area, hence twice the points.
+/// // Flat on the left, a roof of slope √3 on the right: twice the area, so twice the points.
 /// let z = Array2::from_shape_fn((60, 120), |(_, c)| 3.0_f64.sqrt() * (c as f64 - 60.0).max(0.0));
 /// let points = EquallySpaced.sample(z.view(), &Domain::new([1.0, 1.0])?, 90)?;
 /// let level = points.iter().filter(|point| point.x < 60.0).count();
@@ -193,7 +193,7 @@ impl<T: PixelScalar> ControlPointSampler<T> for EquallySpaced {
     }
 }
 
-/// Adds `count` points, each standing for the same weight.
+/// Adds `count` points, each of which represents the same weight.
 fn spread<T: PixelScalar>(
     lattice: &Lattice<'_, '_, T>,
     count: usize,
@@ -203,15 +203,16 @@ fn spread<T: PixelScalar>(
     if count == 0 || lattice.has_room_for(count) && at_centroids(lattice, count, buffers, points) {
         return;
     }
-    // Points nearly as dense as the nodes: nodes themselves, evenly in reading order.
+    // The points are nearly as dense as the nodes: nodes themselves are chosen, evenly in reading
+    // order.
     points.clear();
     let nodes = lattice.nodes().enumerate();
-    // In whole numbers exactly `count` of the nodes pass.
+    // In integer arithmetic exactly `count` of the nodes are chosen.
     let chosen = nodes.filter(|(k, _)| (k + 1) * count / lattice.count > k * count / lattice.count);
     points.extend(chosen.map(|(_, node)| lattice.point(lattice.pixel(node))));
 }
 
-/// Adds the centroids of the cells. False if two of them share a pixel.
+/// Adds the centroids of the cells. Returns false if two of them share a pixel.
 fn at_centroids<T: PixelScalar>(
     lattice: &Lattice<'_, '_, T>,
     count: usize,
@@ -237,14 +238,14 @@ fn at_centroids<T: PixelScalar>(
     pixels.windows(2).all(|pair| pair[0] != pair[1])
 }
 
-/// Nodes per point the areas are measured with, if the surface filled its box. With every pixel of
-/// most surfaces points follow a surface that grows or moves to a hundredth of a pixel, with every
-/// other pixel to a third.
+/// Number of nodes per point for the measurement of areas, if the surface fills its box. With every
+/// pixel of most surfaces, points follow a growing or moving surface to a hundredth of a pixel, and
+/// with every other pixel to a third.
 const NODES_PER_POINT: usize = 100;
-/// Steeper ground counts as this steep (63°). At the rim of a round body the slope has no end: how
-/// much of it a lattice covers depends on the pixels. Points would follow those, not the body.
+/// Upper limit of slopes (63°). At the rim of a round body the slope is infinite, and the part of
+/// it on a lattice depends on the pixels. The points would follow the pixels instead of the body.
 const STEEPEST: f64 = 2.0;
-/// Fewest nodes per point that leave points room to move.
+/// Minimum number of nodes per point at which points can move between nodes.
 const ROOM: usize = 8;
 
 /// A regular lattice of pixels of a surface.
@@ -252,21 +253,22 @@ struct Lattice<'s, 'd, T> {
     surface: ArrayView2<'s, T>,
     domain: Domain<'d, T>,
     area: BoundingBox,
-    /// Pixels from node to node.
+    /// Number of pixels between nodes.
     stride: usize,
     /// Nodes per row.
     columns: usize,
     /// Rows of nodes.
     rows: usize,
-    /// Area of the surface over the node's pixels per area of the pixels. 0 where there is no node.
+    /// Area of the surface over the pixels of the node, divided by the area of the pixels. 0 if
+    /// there is no node.
     weight: Vec<f64>,
-    /// Nodes that lie on the surface.
+    /// Number of nodes on the surface.
     count: usize,
 }
 
 impl<'s, 'd, T: PixelScalar> Lattice<'s, 'd, T> {
-    /// As few pixels as measure the spacing of `points` well, all of them if there is no room to
-    /// move. `weight` is a buffer to be used again.
+    /// The fewest pixels that measure the spacing of `points` well, or all pixels if the points
+    /// cannot move between nodes. `weight` is a buffer that is reused.
     fn sparse(
         surface: ArrayView2<'s, T>,
         domain: &Domain<'d, T>,
@@ -281,7 +283,7 @@ impl<'s, 'd, T: PixelScalar> Lattice<'s, 'd, T> {
             if stride == 1 || lattice.has_room_for(points) {
                 return lattice.enough_for(points);
             }
-            // A thin or small mask in a large box has fewer nodes than the box would hold.
+            // A thin or small mask in a large box has fewer nodes than the box.
             stride /= 2;
             weight = lattice.weight;
         }
@@ -322,7 +324,7 @@ impl<'s, 'd, T: PixelScalar> Lattice<'s, 'd, T> {
         lattice
     }
 
-    /// Where the first node lies in a box of `length` pixels: in the middle of its cell.
+    /// Position of the first node in a box of `length` pixels: in the middle of its cell.
     fn first(stride: usize, length: usize) -> usize {
         (stride / 2).min(length - 1)
     }
@@ -356,13 +358,13 @@ impl<'s, 'd, T: PixelScalar> Lattice<'s, 'd, T> {
         ]
     }
 
-    /// Height of a pixel over its width.
+    /// Height of a pixel divided by its width.
     fn aspect(&self) -> f64 {
         self.domain.pixel_size_m[1].as_f64() / self.domain.pixel_size_m[0].as_f64()
     }
 
-    /// The point at a place (x, y) of the lattice, its height interpolated, and the pixel it lies
-    /// in. Where that is not inside the surface, the nearest node.
+    /// The point at a position (x, y) of the lattice with interpolated height, and the pixel that
+    /// contains it. If that pixel is not inside the surface, the nearest node is used.
     fn point_near(&self, [x, y]: [f64; 2]) -> ([usize; 2], Point3<T>) {
         let place = |start: usize, length: usize, at: f64| {
             (start + Self::first(self.stride, length)) as f64 + at * self.stride as f64
@@ -378,7 +380,7 @@ impl<'s, 'd, T: PixelScalar> Lattice<'s, 'd, T> {
         ([row.round() as usize, column.round() as usize], point)
     }
 
-    /// The node on the surface nearest to a place.
+    /// The node on the surface that is nearest to a position.
     fn nearest(&self, [x, y]: [f64; 2]) -> usize {
         let distance = |node: &usize| {
             let (dx, dy) = (
@@ -392,7 +394,7 @@ impl<'s, 'd, T: PixelScalar> Lattice<'s, 'd, T> {
             .unwrap_or(0)
     }
 
-    /// Height between four pixels, bilinear. `None` unless all four lie on the surface.
+    /// Bilinear height between four pixels. `None` if one of the four is not on the surface.
     fn height_at(&self, row: f64, column: f64) -> Option<T> {
         let (r, c) = (row.floor() as usize, column.floor() as usize);
         let (down, right) = (T::of(row - r as f64), T::of(column - c as f64));
@@ -425,20 +427,20 @@ impl<'s, 'd, T: PixelScalar> Lattice<'s, 'd, T> {
     }
 }
 
-/// A grid of weights to be cut into cells.
+/// A grid of weights that is divided into cells.
 struct Weights<'a> {
-    /// Row by row, 0 where there is no surface.
+    /// Row by row, 0 outside the surface.
     weight: &'a [f64],
     columns: usize,
     /// Rows with a weight.
     rows: usize,
     /// Pixels on the surface.
     count: f64,
-    /// Height of a pixel over its width.
+    /// Height of a pixel divided by its width.
     aspect: f64,
 }
 
-/// Weight of a piece of a column, and its moment along the column.
+/// Weight of a part of a column, and its moment along the column.
 #[derive(Clone, Copy, Debug, Default)]
 struct Piece {
     weight: f64,
@@ -480,7 +482,7 @@ impl Strips {
         }
     }
 
-    /// Cuts the strip gathered last into `cells` of equal weight and adds their centroids.
+    /// Divides the last gathered strip into `cells` of equal weight and adds their centroids.
     fn split(&mut self, cells: usize) {
         let shares = (1..=cells).map(|cell| cell as f64 / cells as f64);
         self.cells
@@ -499,10 +501,10 @@ impl Strips {
     }
 }
 
-/// Number of strips that makes cells about as wide as high.
+/// Number of strips for cells that are about as wide as high.
 fn bands(grid: &Weights<'_>, points: usize) -> usize {
     let width = grid.count / grid.rows as f64;
-    // Cells of side s: rows · aspect/s strips of width/s cells each make up the points.
+    // Cells of side s: there are rows · aspect/s strips of width/s cells each.
     let square = points as f64 * grid.rows as f64 * grid.aspect / width;
     (square.sqrt().round() as usize).clamp(1, points)
 }
@@ -515,7 +517,8 @@ struct Cuts {
 }
 
 impl Cuts {
-    /// Where the running sum of `weights` reaches each of the rising `shares` of its total.
+    /// Positions at which the running sum of `weights` reaches each of the increasing `shares` of
+    /// its total.
     fn find(&mut self, weights: impl Iterator<Item = f64>, shares: impl Iterator<Item = f64>) {
         let Self { weights: line, at } = self;
         line.clear();
@@ -538,7 +541,7 @@ impl Cuts {
     }
 }
 
-/// Parts of the nodes between two cuts: node, share of it, middle of that share.
+/// Parts of the nodes between two cuts: node, fraction of the node, and middle of that fraction.
 fn parts(from: f64, to: f64, nodes: usize) -> impl Iterator<Item = (usize, f64, f64)> {
     (from as usize..(to.ceil() as usize).min(nodes)).filter_map(move |node| {
         let (low, high) = (from.max(node as f64), to.min(node as f64 + 1.0));
@@ -570,7 +573,7 @@ mod tests {
             [0.125, 0.25, 0.5, 1.0].into_iter(),
         );
         assert_eq!(cuts.at, [0.5, 1.0, 2.5, 4.0]);
-        // Without any weight they are numbers all the same.
+        // Without any weight the cuts are finite nevertheless.
         cuts.find([0.0; 3].into_iter(), [0.5, 1.0].into_iter());
         assert_eq!(cuts.at, [1.0, 1.0]);
     }

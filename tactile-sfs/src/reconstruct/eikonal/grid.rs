@@ -1,21 +1,22 @@
-//! From the frame to the grid: nodes, angles to the light, known heights, boundary offsets and
-//! edges. And from the grid to the surface.
+//! From the frame to the grid (nodes, angles to the light, known heights, boundary offsets and
+//! edges), and from the grid to the surface.
 //!
-//! Boundary offsets: how far the pixels next to a boundary of known height stand above it, to a
-//! fraction of a pixel.
+//! A boundary offset is the height of a pixel above a boundary of known height next to it, with
+//! sub-pixel accuracy.
 
 use super::{BoundaryCondition, Eikonal, EikonalBuffers, Node};
 use crate::{Domain, Frame, PixelFlags, PixelScalar, SfsError, Surface};
 
-/// Pixels over which the boundary's kind and curvature are taken to be the same.
+/// Number of pixels over which kind and curvature of the boundary are assumed to be constant.
 const WINDOW: usize = 4;
 
-/// The boundary is at most one pixel away, the rest is slack for the error of the extrapolation.
+/// The boundary is at most one pixel away; the rest is a tolerance for the error of the
+/// extrapolation.
 const REACH: f64 = 1.25;
 
 impl<T: PixelScalar> EikonalBuffers<T> {
-    /// Fills the grid and flags the pixels the model does not explain. Returns whether heights are
-    /// known inside the mask.
+    /// Fills the grid and flags the pixels that disagree with the model. Returns whether heights
+    /// are known inside the mask.
     pub(super) fn load(
         &mut self,
         method: &Eikonal<T>,
@@ -31,9 +32,8 @@ impl<T: PixelScalar> EikonalBuffers<T> {
             BoundaryCondition::Height(height) => Some(height),
             BoundaryCondition::Free => None,
         };
-        // The darkest reflectance that is told from black.
-        // R = 1/√(1 + slope²) at the largest slope. A darker pixel would be steeper than any
-        // allowed.
+        // The lowest reflectance that differs from black: R = 1/√(1 + slope²) at the largest slope.
+        // A darker pixel would be steeper than allowed.
         let least = (T::one() + method.max_slope.powi(2)).sqrt().recip();
         let (frame_rows, frame_columns) = frame.dim();
         let (mut known_inside, mut known_outside) = (false, false);
@@ -47,7 +47,7 @@ impl<T: PixelScalar> EikonalBuffers<T> {
             let known = domain.known(row, column);
             if !domain.contains(row, column) {
                 if let Some(height) = known.or(at_border) {
-                    // The grid counts in widths of a pixel, in which slopes have no unit.
+                    // The grid uses the width of a pixel as its unit, so that slopes have no unit.
                     self.given[i] = height / hx;
                     known_outside = true;
                 }
@@ -72,8 +72,8 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         }
         self.fill_holes(area.area())?;
         for (sine, &cosine) in self.sine.iter_mut().zip(&self.cosine) {
-            // As a product, because 1 − cos² loses half of the digits where the surface faces the
-            // light.
+            // Written as a product, because 1 − cos² loses half of the digits at normals that point
+            // to the light.
             *sine = ((T::one() - cosine) * (T::one() + cosine))
                 .max(T::zero())
                 .sqrt();
@@ -105,16 +105,16 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         self.holes.clear();
     }
 
-    /// Gives pixels without a finite intensity the mean of their finite neighbours, from the edge
-    /// of a hole inwards. A part of the mask without any intensity is taken as flat, for want of
-    /// better. A mask without any is refused.
+    /// Fills pixels without a finite intensity with the mean of their finite neighbours, from the
+    /// edge of a hole inwards. A region of the mask without any intensity is taken as flat, for
+    /// lack of data. A mask without any intensity is an error.
     fn fill_holes(&mut self, pixels: usize) -> Result<(), SfsError> {
         for _ in 0..pixels {
             let before = self.holes.len();
             if before == 0 {
                 break;
             }
-            // `kept` holds the new values until the pass is over, so that the order does not
+            // `kept` holds the new values until the end of the pass, so that the order does not
             // matter.
             let mut values = core::mem::take(&mut self.kept);
             values.clear();
@@ -135,14 +135,15 @@ impl<T: PixelScalar> EikonalBuffers<T> {
                 {
                     return Err(SfsError::EmptyMask);
                 }
-                // No neighbour has a value: the rest is a part of the mask by itself.
+                // No neighbour has a value: the remaining pixels form an isolated region of the
+                // mask.
                 self.holes.drain(..).for_each(|i| self.cosine[i] = T::one());
             }
         }
         Ok(())
     }
 
-    /// Mean reflectance of the eight neighbours that have one, NaN if none has.
+    /// Mean reflectance of the eight neighbours that have one. NaN if none has.
     fn mean_around(&self, i: usize) -> T {
         let (mut sum, mut count) = (T::zero(), 0usize);
         for line in [i - self.width, i, i + self.width] {
@@ -162,17 +163,18 @@ impl<T: PixelScalar> EikonalBuffers<T> {
 
     /// 1/(slope · step)² by the chord rule for every edge between two nodes of the mask.
     fn measure_edges(&mut self) {
-        // A floor keeps flat parts (slope 0) from dividing by zero: 10⁻⁶ pixels per pixel.
+        // A lower bound of 10⁻⁶ pixels per pixel avoids a division by zero in flat regions (slope
+        // 0).
         let floor = T::of(1e-6);
         let metric = |sine: [T; 2], cosine: [T; 2], step: T| {
-            // The tangent of the mean angle, from sines and cosines without any arctangent.
+            // The tangent of the mean angle, computed from sines and cosines without an arctangent.
             let slope = (sine[0] + sine[1]) / (cosine[0] + cosine[1]);
             (slope.max(floor) * step).powi(-2)
         };
         let (width, aspect) = (self.width, self.aspect);
         let rest = self.node.len() - 2 * width;
-        // Every node and those after and below it, as slices of one length. No step has to check
-        // bounds.
+        // Every node and the nodes to its right and below, as slices of equal length, so that no
+        // index needs a bounds check.
         let (sine, cosine) = (&self.sine[width..], &self.cosine[width..]);
         let (sine_right, cosine_right) = (&sine[1..=rest], &cosine[1..=rest]);
         let (sine_below, cosine_below) = (&sine[width..][..rest], &cosine[width..][..rest]);
@@ -211,22 +213,21 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         }
     }
 
-    /// Measures the boundary offset of every unknown pixel of the mask that has a given height
-    /// outside next to it.
+    /// Measures the boundary offset of every unknown pixel of the mask next to a given height
+    /// outside the mask.
     ///
-    /// The solution is a minimum over the whole boundary: one pixel that noise makes look flatter
-    /// than it is would draw down the whole surface. So the kind of boundary is decided by the
-    /// majority of the boundary pixels around, and their mean
-    /// |∇ sin θ| is taken.
+    /// The solution is a minimum over the whole boundary: one pixel that appears too flat because
+    /// of noise would lower the whole surface. The kind of boundary is therefore decided by the
+    /// majority of the boundary pixels around a pixel, and their mean |∇ sin θ| is used.
     fn measure_offsets(&mut self) {
         for i in self.width..self.node.len() - self.width {
             let near = [i - 1, i + 1, i - self.width, i + self.width];
-            // Most nodes have none outside beside them.
+            // Most nodes have no neighbour outside the mask.
             if !near.iter().any(|&j| self.node[j] == Node::Outside) {
                 continue;
             }
             if self.node[i] == Node::Unknown && self.lowest(i, T::one()).is_finite() {
-                // Until the edges are measured their place holds |∇ sin θ| and step.
+                // This array holds |∇ sin θ| and step until the edges are measured.
                 self.edges[i] = self.gradient_and_step(i);
                 self.offset[i] = T::zero();
             }
@@ -238,7 +239,7 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         }
     }
 
-    /// Sets the values that sweeps start from: known heights, and boundary heights with their
+    /// Sets the values from which sweeps start: known heights, and boundary heights with their
     /// offsets.
     pub(super) fn start(&mut self, convex: bool) {
         let sign = if convex { T::one() } else { -T::one() };
@@ -246,16 +247,16 @@ impl<T: PixelScalar> EikonalBuffers<T> {
             self.active[i] = self.node[i] == Node::Unknown;
             self.value[i] = match self.node[i] {
                 Node::Known => sign * self.given[i],
-                // The surface rises from the boundary in the convex branch, and in the concave one
-                // seen upside down.
+                // The surface rises from the boundary in the convex branch, and in the concave
+                // branch after a change of sign.
                 Node::Unknown if !self.offset[i].is_nan() => self.lowest(i, sign) + self.offset[i],
                 _ => T::infinity(),
             };
         }
     }
 
-    /// Lowest (highest for sign −1, negated) height given outside the mask next to a pixel, +∞ if
-    /// there is none.
+    /// Lowest height given outside the mask next to a pixel, or +∞ if there is none. For sign −1 it
+    /// is the negated highest.
     fn lowest(&self, i: usize, sign: T) -> T {
         let width = self.width;
         let given = |j: usize| match self.node[j] {
@@ -268,12 +269,12 @@ impl<T: PixelScalar> EikonalBuffers<T> {
             .min(given(i + width))
     }
 
-    /// |∇ sin θ| at a pixel, and how far the boundary can be from it along that gradient.
+    /// |∇ sin θ| at a pixel, and the largest possible distance of the boundary along that gradient.
     fn gradient_and_step(&self, i: usize) -> [T; 2] {
         let [gx, gy] = self.gradient(i);
         let length = gx.hypot(gy);
         if length > T::zero() {
-            // Projection of the step to the next pixel, along the steeper axis, on the gradient.
+            // Projection of the step to the next pixel along the steeper axis onto the gradient.
             let step = gx.abs().max(gy.abs() * self.aspect) / length;
             [length, step]
         } else {
@@ -289,18 +290,18 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         ]
     }
 
-    /// At an occluding contour sin θ is continued to 1. Elsewhere the boundary is half a pixel
-    /// away.
+    /// The boundary offset of a pixel. At an occluding contour, sin θ is extrapolated to 1.
+    /// Elsewhere the boundary is half a pixel away.
     fn offset_of(&self, i: usize) -> T {
         let (sine, cosine) = (self.sine[i], self.cosine[i]);
         let (gradient, occluding) = self.around(i);
         if occluding {
-            // Radius of curvature times cos θ: the height above the contour, where the normal lies
-            // in the image plane.
+            // Radius of curvature times cos θ: the height above the contour, at which the normal
+            // lies in the image plane.
             return cosine / gradient;
         }
         let half_step = T::of(0.5) * self.edges[i][1];
-        // Continued outwards, the sine may exceed 1.
+        // Extrapolated outwards, the sine may exceed 1.
         let boundary_sine = (sine + half_step * gradient).min(T::one());
         let boundary_cosine = (T::one() - boundary_sine * boundary_sine)
             .max(T::zero())
@@ -308,7 +309,7 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         half_step * (sine + boundary_sine) / (cosine + boundary_cosine)
     }
 
-    /// Mean |∇ sin θ| of the boundary pixels around one, and whether most of them lie at an
+    /// Mean |∇ sin θ| of the boundary pixels around a pixel, and whether most of them lie at an
     /// occluding contour.
     fn around(&self, i: usize) -> (T, bool) {
         let (width, rows) = (self.width, self.node.len() / self.width);
@@ -335,8 +336,8 @@ impl<T: PixelScalar> EikonalBuffers<T> {
         gx * gx / (gx * gx + gy * gy)
     }
 
-    /// Derivative of sin θ along one axis, from the neighbours inside the mask. Second order where
-    /// there are enough.
+    /// Derivative of sin θ along one axis, from the neighbours inside the mask. It is of second
+    /// order if there are enough neighbours.
     fn derivative(&self, i: usize, stride: usize) -> T {
         let inside = |j: Option<usize>| {
             j.filter(|&j| self.node.get(j).is_some_and(|&node| node != Node::Outside))
@@ -358,7 +359,7 @@ impl<T: PixelScalar> EikonalBuffers<T> {
     }
 }
 
-/// Makes a buffer `length` copies of `value`.
+/// Fills a buffer with `length` copies of `value`.
 fn fill<A: Copy>(buffer: &mut Vec<A>, length: usize, value: A) {
     buffer.clear();
     buffer.resize(length, value);

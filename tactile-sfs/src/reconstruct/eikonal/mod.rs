@@ -1,39 +1,39 @@
-//! The eikonal equation of shading, by fast sweeping.
+//! The eikonal equation of shading, solved by fast sweeping.
 //!
-//! Under frontal light a Lambertian surface obeys |∇z| = √(1/R² − 1), R the reflectance. Its
-//! viscosity solutions are shortest-path distances, d the least integral of the slope along a path.
-//! From known heights z_k upwards, z(x) = min_k (z_k + d(x, k)), or downwards, z(x) = max_k (z_k −
-//! d(x, k)). These are the two readings of frontal shading, convex and concave as seen from a known
-//! boundary. A bump is the first if its minima and boundary are known (from any point the steepest
-//! descent ends there). It is the second if its maxima are. No sign structure is needed: further
-//! known heights never hurt either.
+//! Under frontal light a Lambertian surface satisfies |∇z| = √(1/R² − 1), with the reflectance R.
+//! Its viscosity solutions are shortest-path distances: d is the least integral of the slope along
+//! a path. From known heights z_k, the surface is z(x) = min_k (z_k + d(x, k)) upwards or z(x) =
+//! max_k (z_k − d(x, k)) downwards. These are the two interpretations of frontal shading, convex
+//! and concave with respect to a known boundary. A bump is the first if its minima and boundary are
+//! known (the steepest descent from any point ends there). It is the second if its maxima are
+//! known. No signs need to be known, and additional known heights are always valid.
 //!
-//! Three things make it accurate where textbook sweeping (first order in the slope at the pixel) is
-//! not:
+//! It is more accurate than plain sweeping, which is of first order in the slope at the pixel, for
+//! three reasons:
 //!
-//! - *Chord rule.* Between neighbours with normal angles θ₁, θ₂ the slope is tan((θ₁ + θ₂)/2) =
-//!   (sin θ₁ + sin θ₂)/(cos θ₁ + cos θ₂): second order, exact on a circular profile, and finite up
-//!   to a vertical rim.
-//! - *Deferred correction.* A second solve uses the directions of the first to bring the slopes of
-//!   both axes to the same place, which makes smooth parts second order. Where a profile is fitted
-//!   to the contact its directions are taken, and one solve is enough. Half a ball of 26 pixels
-//!   comes out within 0.04 pixels instead of 0.13.
-//! - *Sub-pixel boundary.* The boundary lies between the last pixel of the mask and the next. Where
-//!   sin θ, continued outwards, reaches 1 within that pixel the contour is occluding. The last
-//!   pixel then is cos θ/|∇ sin θ| above it (the radius of curvature is 1/|∇ sin θ|). Elsewhere the
-//!   boundary is taken half a pixel away.
+//! - *Chord rule.* Between neighbours with normal angles θ₁ and θ₂ the slope is tan((θ₁ + θ₂)/2) =
+//!   (sin θ₁ + sin θ₂)/(cos θ₁ + cos θ₂). This is of second order, exact on a circular profile, and
+//!   finite up to a vertical rim.
+//! - *Deferred correction.* A second solution uses the directions of the first to evaluate the
+//!   slopes of both axes at the same point, which gives second order on smooth regions. If a
+//!   profile is fitted to the contact, its directions are used, and one solution is enough. Half a
+//!   ball of 26 pixels is accurate to 0.04 pixels instead of 0.13.
+//! - *Sub-pixel boundary.* The boundary lies between the last pixel of the mask and the next. If
+//!   sin θ, extrapolated outwards, reaches 1 within that pixel, the contour is occluding. The last
+//!   pixel is then cos θ/|∇ sin θ| above it (the radius of curvature is 1/|∇ sin θ|). Elsewhere the
+//!   boundary is assumed to be half a pixel away.
 //!
 //! Oblique light makes the equation anisotropic: R √(1 + |∇z|²) + s·∇z = s_z. Each of the four
-//! triangles around a pixel is solved with its causality condition (Kao, Osher & Qian 2004, Qian,
-//! Zhang & Zhao 2007).
+//! triangles around a pixel is solved with its causality condition (Kao, Osher and Qian 2004; Qian,
+//! Zhang and Zhao 2007).
 //!
-//! A fitted profile also gives nearly the order in which a front from the rim reaches the pixels.
-//! Every node is upwind of those that it lowers: visited in the order of their values, all have
-//! their final value after one pass (Tsitsiklis 1995, Sethian 1996). That order is only a start:
-//! sweeps follow until nothing changes.
+//! A fitted profile also gives approximately the order in which a front from the rim reaches the
+//! pixels. Every node is upwind of the nodes that it lowers: if nodes are visited in the order of
+//! their values, all have their final value after one pass (Tsitsiklis 1995, Sethian 1996). This
+//! order is only a first step: sweeps follow until no value changes.
 //!
-//! References: Rouy & Tourin 1992 (viscosity), Zhao 2005 (fast sweeping), Bak, McLaughlin & Renzi
-//! 2010 (locking), Prados & Faugeras 2005 (oblique light).
+//! References: Rouy and Tourin 1992 (viscosity), Zhao 2005 (fast sweeping), Bak, McLaughlin and
+//! Renzi 2010 (locking), Prados and Faugeras 2005 (oblique light).
 
 mod grid;
 mod profile;
@@ -68,7 +68,7 @@ use profile::Profile;
 ///     .with_boundary(BoundaryCondition::Height(3.0))?
 ///     .reconstruct(Image::new(image.view(), domain))?
 ///     .heights;
-/// assert!((heights[[10, 10]] - 11.0).abs() < 1.0); // slope 1 from the boundary, 8 px away
+/// assert!((heights[[10, 10]] - 11.0).abs() < 1.0); // slope 1 over 8 px from the boundary
 /// let free = method
 ///     .with_boundary(BoundaryCondition::Free)?
 ///     .reconstruct(Image::new(image.view(), domain));
@@ -78,19 +78,19 @@ use profile::Profile;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum BoundaryCondition<T> {
-    /// Nothing is known there but the domain's known heights.
+    /// Only the known heights of the domain are known.
     Free,
-    /// The surface meets this height at the border of the mask (not where the frame cuts it off).
+    /// The surface has this height at the border of the mask (but not at the border of the frame).
     Height(T),
 }
 
-/// Which of the two surfaces with the same shading: convex or concave, as seen from the known
+/// Which of the two surfaces with the same shading: convex or concave with respect to the known
 /// heights.
 ///
 /// ```
 /// use ndarray::Array2;
 /// use tactile_sfs::{Domain, Eikonal, EikonalBranch, Image, Lighting, SurfaceReconstruction};
-/// // n·s = 1/√2: slope 1 everywhere. The centre is known to be at 10.
+/// // n·s = 1/√2: the slope is 1 everywhere. The height of the centre is known to be 10.
 /// let image = Array2::from_elem((15, 15), 0.5_f64.sqrt());
 /// let known = Array2::from_shape_fn((15, 15), |at| if at == (7, 7) { 10.0 } else { f64::NAN });
 /// let border = |branch| {
@@ -107,31 +107,31 @@ pub enum BoundaryCondition<T> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum EikonalBranch {
-    /// Convex if no height inside the mask is known. Else both are computed and the one whose
-    /// shading is nearer to the image is returned (false folds give the wrong one away).
+    /// Convex if no height inside the mask is known. Otherwise both are computed, and the one whose
+    /// shading is closer to the image is returned (the wrong branch has folds).
     Auto,
-    /// Heights rise from the known ones, z = min (z_k + d): a bump on its boundary. Right if all
+    /// Heights rise from the known ones, z = min (z_k + d): a bump on its boundary. Correct if all
     /// minima and the boundary are known.
     Convex,
-    /// Heights fall from the known ones, z = max (z_k − d): a hollow under its boundary, or a bump
-    /// under its known top. Right if all maxima are known.
+    /// Heights fall from the known ones, z = max (z_k − d): a hollow below its boundary, or a bump
+    /// below its known top. Correct if all maxima are known.
     Concave,
 }
 
 /// Shape from shading by the eikonal equation, for frontal and oblique light.
 ///
-/// Known heights inside the mask hold at the pixel's centre. Those outside, next to the mask, are
-/// the height the surface reaches at the mask's border. Pixels no known height reaches are flagged
-/// `UNREACHED`.
+/// Known heights inside the mask apply to the centre of the pixel. Known heights outside, next to
+/// the mask, are the heights of the surface at the border of the mask. Pixels that cannot be
+/// reached from a known height have the flag `UNREACHED`.
 ///
-/// Cost: a few sweeps over the bounding box, O(pixels). `report.iterations` counts them,
-/// `report.residual` is the last change of height. Error on smooth surfaces: at least first order
-/// in the pixel, under frontal light nearly second.
+/// Cost: a few sweeps over the bounding box, O(pixels). `report.iterations` is their number and
+/// `report.residual` the last change of height. The error on smooth surfaces is at least of first
+/// order in the pixel, and nearly of second order under frontal light.
 ///
 /// ```
 /// use ndarray::Array2;
 /// use tactile_sfs::{BoundaryCondition, Domain, Eikonal, Image, Lighting, SurfaceReconstruction};
-/// // A hemisphere of radius 20 px: R = z/20, vertical at its boundary.
+/// // A hemisphere of radius 20 px: R = z/20, vertical at the boundary.
 /// let z = Array2::from_shape_fn((45, 45), |(r, c)| {
 ///     (400.0 - (r as f64 - 22.0).powi(2) - (c as f64 - 22.0).powi(2)).max(0.0).sqrt()
 /// });
@@ -155,8 +155,8 @@ pub struct Eikonal<T> {
 }
 
 impl<T: PixelScalar> Eikonal<T> {
-    /// The method with a free boundary, [`EikonalBranch::Auto`], slopes up to 100, a tolerance of
-    /// 10⁻⁵ pixels and at most 400 sweeps.
+    /// Creates the method with a free boundary, [`EikonalBranch::Auto`], slopes up to 100, a
+    /// tolerance of 10⁻⁵ pixels and at most 400 sweeps.
     pub fn new(lighting: Lighting<T>) -> Self {
         Self {
             lighting,
@@ -169,7 +169,7 @@ impl<T: PixelScalar> Eikonal<T> {
         }
     }
 
-    /// The height at the border of the mask.
+    /// Sets the condition at the border of the mask.
     ///
     /// # Errors
     /// [`SfsError::InvalidOption`] for a height that is not finite.
@@ -180,24 +180,25 @@ impl<T: PixelScalar> Eikonal<T> {
         Ok(Self { boundary, ..self })
     }
 
-    /// Which of the two surfaces with the same shading.
+    /// Sets which of the two surfaces with the same shading is computed.
     pub fn with_branch(self, branch: EikonalBranch) -> Self {
         Self { branch, ..self }
     }
 
-    /// Whether the shading of the two or three pixels next to the mask's border, blurred and partly
-    /// covered in a real frame, is replaced by that of an elliptical profile fitted to the inside,
-    /// R² = 1 − x²/a² − y²/b² (Hertz's contact of smooth bodies). The surface then starts on the
-    /// sub-pixel contour of that profile. Where the profile explains less than 90 % of the variance
-    /// of R², and under oblique light, nothing is replaced. O(pixels of the mask's box).
+    /// Sets whether the shading near the border of the mask is replaced by that of a fitted
+    /// profile. In a real frame the two or three pixels next to the border are blurred and partly
+    /// covered. The elliptical profile R² = 1 − x²/a² − y²/b² (Hertz's contact of smooth bodies) is
+    /// fitted to the inside, and the surface starts on its sub-pixel contour. Nothing is replaced
+    /// under oblique light, or if the profile explains less than 90 % of the variance of R².
+    /// O(pixels of the mask's box).
     ///
     /// ```
     /// use ndarray::Array2;
     /// use tactile_sfs::{
     ///     BoundaryCondition, Domain, Eikonal, Image, Lighting, SurfaceReconstruction,
     /// };
-    /// // A hemisphere of radius 20 px in a frame that a lens blurs: each pixel is the mean of
-    /// // those around it.
+    /// // A hemisphere of radius 20 px in a frame blurred by a lens: each pixel is the mean of its
+    /// // neighbourhood.
     /// let square = |r: usize, c: usize| (r as f64 - 25.3).powi(2) + (c as f64 - 24.6).powi(2);
     /// let light = |r: usize, c: usize| (400.0 - square(r, c)).max(0.0).sqrt() / 20.0;
     /// let sharp = Array2::from_shape_fn((52, 52), |(r, c)| light(r, c));
@@ -222,7 +223,8 @@ impl<T: PixelScalar> Eikonal<T> {
         }
     }
 
-    /// Sweeping ends when no height changes by more than `tolerance` pixels (widths of a pixel).
+    /// Sets the tolerance: sweeping ends when no height changes by more than `tolerance` widths of
+    /// a pixel.
     ///
     /// ```
     /// use ndarray::array;
@@ -235,14 +237,14 @@ impl<T: PixelScalar> Eikonal<T> {
     ///     .with_tolerance(1e-6)?;
     /// let domain = Domain::default().with_known_heights(known.view());
     /// let surface = method.reconstruct(Image::new(array![[1.0, 1.0, 0.0, 1.0]].view(), domain))?;
-    /// // Black would be infinitely steep.
+    /// // A black pixel would be infinitely steep.
     /// assert!(surface.flags[[0, 2]].contains(PixelFlags::DARK));
     /// assert!(surface.heights[[0, 3]].is_finite());
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] unless positive and finite.
+    /// [`SfsError::InvalidOption`] for a tolerance that is not positive and finite.
     pub fn with_tolerance(self, tolerance: T) -> Result<Self, SfsError> {
         Requirement::Positive.check("tolerance", tolerance.as_f64())?;
         Ok(Self { tolerance, ..self })
@@ -265,7 +267,7 @@ impl<T: PixelScalar> SurfaceReconstruction<T> for Eikonal<T> {
             return self.reconstruct_as_given(workspace, &values, &domain, None, surface);
         };
         let area = domain.bounding_box(values.dim())?;
-        // Taken out, because the solve below borrows the whole workspace.
+        // Moved out, because the solution below borrows the whole workspace.
         let mut buffers = core::mem::take(&mut workspace.profile);
         let profile = if self.lighting.is_frontal() {
             buffers.fill(&values, mask, area, &self.lighting)
@@ -287,55 +289,57 @@ impl<T: PixelScalar> SurfaceReconstruction<T> for Eikonal<T> {
     }
 }
 
-/// Nodes of the mask's box with a border of one pixel all around, in units of a pixel's width.
+/// Nodes of the mask's box with a border of one pixel, in units of the pixel width.
 #[derive(Debug, Default)]
 pub(crate) struct EikonalBuffers<T> {
     /// Nodes per row.
     width: usize,
-    /// Height of a pixel over its width.
+    /// Height of a pixel divided by its width.
     aspect: T,
     node: Vec<Node>,
     /// Nodes whose value may still improve.
     active: Vec<bool>,
-    /// Reflectance R = cos of the angle between normal and light, and the sine of that angle.
+    /// Reflectance R (cosine of the angle between normal and light), and the sine of that angle.
     cosine: Vec<T>,
     sine: Vec<T>,
-    /// Given heights: inside the mask at the pixel's centre, outside it at the mask's border. NaN
-    /// elsewhere.
+    /// Given heights: inside the mask at the centre of the pixel, outside at the border of the
+    /// mask. NaN elsewhere.
     given: Vec<T>,
-    /// Height of the convex branch, or minus that of the concave one. +∞ where not reached.
+    /// Height of the convex branch, or the negated height of the concave branch. +∞ at nodes that
+    /// are not reached.
     value: Vec<T>,
-    /// Values of the branch solved first.
+    /// Values of the branch that was solved first.
     kept: Vec<T>,
-    /// Boundary offset: height of a node above the boundary next to it, NaN away from the boundary.
+    /// Boundary offset: height of a node above the boundary next to it. NaN if the node is not at
+    /// the boundary.
     offset: Vec<T>,
     /// 1/(slope · step)² of the edge to the next node in x and in y.
     edges: Vec<[T; 2]>,
     /// cos²φ of the gradient, whether sweeps use it, and whether a fitted profile has given it
-    /// before any solution.
+    /// before the first solution.
     along_x: Vec<T>,
     corrected: bool,
     directed: bool,
     /// Nodes whose intensity is not finite.
     holes: Vec<usize>,
-    /// Unknown nodes in the order in which the front is expected to reach them, after a level in
-    /// the upper half of the number. Empty where nothing is expected.
+    /// Unknown nodes in the expected order of the front, with a level in the upper half of the
+    /// number. Empty if no order is expected.
     front: Vec<u64>,
 }
 
 /// The state of a node of the grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Node {
-    /// Not in the mask.
+    /// Outside the mask.
     #[default]
     Outside,
     /// To be solved for.
     Unknown,
-    /// In the mask, height given.
+    /// In the mask, with a given height.
     Known,
 }
 
-/// How one branch was solved.
+/// Result of the solution of one branch.
 #[derive(Clone, Copy)]
 struct Outcome<T> {
     convex: bool,
@@ -356,8 +360,7 @@ impl<T: PixelScalar> Eikonal<T> {
     ) -> Result<(), SfsError> {
         surface.enter(frame.dim(), domain)?;
         let known_inside = workspace.eikonal.load(self, frame, domain, surface)?;
-        // Where heights are known here and there lines of equal light need not be those of equal
-        // height.
+        // With known heights, lines of equal light need not be lines of equal height.
         if let Some(profile) = profile.filter(|_| domain.known_heights.is_none()) {
             workspace.eikonal.follow(profile, surface.bounding_box);
         }
@@ -366,14 +369,14 @@ impl<T: PixelScalar> Eikonal<T> {
         surface.report.stop = outcome.stop;
         surface.report.iterations = outcome.sweeps;
         surface.report.residual = outcome.change * width;
-        // The concave branch was solved for −z. The grid counts in widths of a pixel.
+        // The concave branch was solved for −z. The grid uses the width of a pixel as its unit.
         let scale = if outcome.convex { width } else { -width };
         workspace.eikonal.store(scale, domain, surface);
         surface.finish(domain);
         Ok(())
     }
 
-    /// Solves the branch asked for, or both and keeps the better.
+    /// Solves the requested branch, or both, and keeps the better one.
     fn choose(&self, workspace: &mut SurfaceWorkspace<T>, known_inside: bool) -> Outcome<T> {
         let first = self.solve(workspace, self.branch != EikonalBranch::Concave);
         let both = self.branch == EikonalBranch::Auto && known_inside;
@@ -381,7 +384,8 @@ impl<T: PixelScalar> Eikonal<T> {
             return first;
         }
         let grid = &mut workspace.eikonal;
-        // The convex branch is put aside while the concave one uses the same arrays.
+        // The values of the convex branch are saved, because the concave branch uses the same
+        // arrays.
         grid.kept.clone_from(&grid.value);
         let second = self.solve(workspace, false);
         let sweeps = first.sweeps + second.sweeps;
@@ -394,15 +398,15 @@ impl<T: PixelScalar> Eikonal<T> {
         Outcome { sweeps, ..second }
     }
 
-    /// Solves one branch into the buffers' values. Under frontal light that takes two solves, the
-    /// second with the directions of the first, unless a fitted profile has given those of a convex
+    /// Solves one branch into the values of the buffers. Under frontal light a second solution uses
+    /// the directions of the first, unless a fitted profile has given the directions of a convex
     /// surface.
     fn solve(&self, workspace: &mut SurfaceWorkspace<T>, convex: bool) -> Outcome<T> {
         let grid = &mut workspace.eikonal;
         grid.corrected = convex && grid.directed;
         let corrected = grid.corrected;
         let first = self.sweep(workspace, convex, 0);
-        // The second solve is for frontal light alone and needs the directions of a converged
+        // The second solution applies only to frontal light and needs the directions of a converged
         // surface.
         if corrected || !self.lighting.is_frontal() || first.stop != StopReason::Converged {
             return first;
@@ -412,11 +416,12 @@ impl<T: PixelScalar> Eikonal<T> {
         self.sweep(workspace, convex, first.sweeps)
     }
 
-    /// Sweeps until nothing changes, along the expected front first.
+    /// Sweeps until no value changes, first along the expected front.
     fn sweep(&self, workspace: &mut SurfaceWorkspace<T>, convex: bool, done: usize) -> Outcome<T> {
         workspace.eikonal.start(convex);
         let light = (!self.lighting.is_frontal()).then(|| {
-            // The concave branch is the convex one of −z, which the mirrored light shades alike.
+            // The concave branch is the convex branch of −z, which has the same shading under the
+            // mirrored light.
             let [x, y, z] = self.lighting.direction();
             if convex { [x, y, z] } else { [-x, -y, z] }
         });
@@ -427,7 +432,7 @@ impl<T: PixelScalar> Eikonal<T> {
             change: T::infinity(),
         };
         let marched = convex && !workspace.eikonal.front.is_empty();
-        // Three passes along an expected front, then sweeps in four directions, which reach any
+        // Three passes along the expected front, then sweeps in four directions, which follow any
         // front.
         for _ in 0..if marched { self.max_sweeps.min(3) } else { 0 } {
             outcome.sweeps += 1;
@@ -459,8 +464,8 @@ impl<T: PixelScalar> Eikonal<T> {
 }
 
 impl<T: PixelScalar> EikonalBuffers<T> {
-    /// Sum of squared differences of reflectance over the nodes with four neighbours: the wrong
-    /// branch has folds, and folds shade differently.
+    /// Sum of squared differences of reflectance over the nodes with four neighbours. The wrong
+    /// branch has folds, whose shading differs from the image.
     fn misfit(&self, value: &[T], sign: T, [x, y, z]: [T; 3]) -> T {
         let (width, half) = (self.width, T::of(0.5) * sign);
         let mut sum = T::zero();
@@ -471,8 +476,9 @@ impl<T: PixelScalar> EikonalBuffers<T> {
                 continue;
             }
             if near.iter().any(|&j| !value[j].is_finite()) {
-                // Nothing to compare. Folds make 0.02 to 0.1 on average, right branches less than
-                // 0.005. Under oblique light the right branch often ends at shadows.
+                // There is nothing to compare. Folds cause 0.02 to 0.1 on average, and correct
+                // branches less than 0.005. Under oblique light the correct branch often ends at
+                // shadows.
                 sum += T::of(0.01);
                 continue;
             }
@@ -480,7 +486,7 @@ impl<T: PixelScalar> EikonalBuffers<T> {
             let q = half * (value[i + width] - value[i - width]) / self.aspect;
             let shade = (z - x * p - y * q) / (T::one() + p * p + q * q).sqrt();
             let difference = shade.max(T::zero()) - self.cosine[i];
-            // A slope whose square overflows has no shading. It counts as the largest misfit.
+            // A slope whose square overflows has no shading and counts as the largest misfit.
             sum += if difference.is_finite() {
                 difference * difference
             } else {

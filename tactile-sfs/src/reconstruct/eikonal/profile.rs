@@ -1,20 +1,21 @@
 //! The shading next to the boundary of a round contact, from a profile fitted to the inside.
 //!
-//! The last two or three pixels before an occluding boundary are the worst of a frame: partly
-//! covered, blurred by the lens, and where the slope has no end. A surface started there inherits
-//! their errors whole. For an elliptical body that the plane cuts in half, as for Hertz's pressure
-//! under any two smooth bodies, R² = 1 − x²/a² − y²/b². That is a quadratic function of the pixel,
-//! which the inside determines and which is zero on the contour.
+//! The last two or three pixels before an occluding boundary have the largest errors in a frame:
+//! they are partly covered, blurred by the lens, and infinitely steep at the contour. A surface
+//! that starts there inherits all of their errors. For an elliptical body cut in half by the plane,
+//! as for Hertz's pressure under any two smooth bodies, R² = 1 − x²/a² − y²/b². This is a quadratic
+//! function of the pixel position, which the inside determines and which is zero on the contour.
 //!
-//! At finite strain the pressure departs from Hertz's: R = √(1 − ρ²) (1 − c ρ²) with ρ² = x²/a² +
+//! At finite strain the pressure differs from Hertz's: R = √(1 − ρ²) (1 − c ρ²) with ρ² = x²/a² +
 //! y²/b² and c from −0.3 to 0.15. The zero of the quadratic then misses the contour by up to a
 //! hundredth of a, where the surface is steepest. On a press simulated by finite elements the
-//! heights came out 10 and 14 % too high. So R² = A (1 − ρ²) (1 − c ρ²)² is fitted to the means of
-//! R² along the ellipses of the quadratic, where that explains most of the quadratic's residual.
+//! heights were 10 and 14 % too high. Therefore R² = A (1 − ρ²) (1 − c ρ²)² is fitted to the means
+//! of R² along the ellipses of the quadratic, and used if it explains most of the residual of the
+//! quadratic.
 //!
-//! Contact detection fits a round profile with the same bend to the frame. This one is its own: it
-//! follows ellipses, and it belongs to the image that is reconstructed, which is averaged over
-//! blocks, smoothed and made linear in the pressure.
+//! Contact detection fits a round profile with the same bend to the frame. This profile is
+//! separate: it has elliptical contours and is fitted to the image to be reconstructed, which is
+//! averaged over blocks, smoothed and made linear in the pressure.
 
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use ndarray::{Array2, ArrayView2};
@@ -22,14 +23,14 @@ use ndarray::{Array2, ArrayView2};
 use crate::surface::fill_shape;
 use crate::{BoundingBox, Frame, Lighting, PixelScalar};
 
-/// Pixels nearer than this to the mask's border are replaced: three standard deviations of a lens's
-/// blur of 0.8 pixels. With 1.5 and 3.2 the strain of simulated presses is off by a fifth to a half
-/// more (frames of 174 to 696 pixels).
+/// Pixels closer than this to the border of the mask are replaced: three standard deviations of a
+/// lens blur of 0.8 pixels. With 1.5 and 3.2 pixels the error of strain in simulated presses is
+/// larger by a fifth to a half (frames of 174 to 696 pixels).
 ///
-/// As far outside the mask pixels may come to lie inside the fitted contour.
+/// Pixels within this distance outside the mask may lie inside the fitted contour.
 const RING_PX: f64 = 2.3;
 
-/// Whole pixels of the ring.
+/// Number of whole pixels in the ring.
 const REACH: usize = RING_PX as usize;
 
 /// Image and mask with the boundary replaced, kept between calls.
@@ -42,8 +43,8 @@ pub(crate) struct ProfileBuffers<T> {
 }
 
 impl<T: PixelScalar> ProfileBuffers<T> {
-    /// Fits the profile and fills `image` and `mask`. `None` where the contact is no ellipse, and
-    /// nothing is replaced.
+    /// Fits the profile and fills `image` and `mask`. If the contact is not an ellipse, the result
+    /// is `None` and nothing is replaced.
     pub(super) fn fill(
         &mut self,
         frame: &Frame<'_, T>,
@@ -70,13 +71,14 @@ impl<T: PixelScalar> ProfileBuffers<T> {
                 self.image[[row, column]] = light;
                 self.mask[[row, column]] = true;
                 let reflectance = lighting.reflectance(light).as_f64();
-                // With its sign, so that noise about 0 does not become a positive mean.
+                // The sign is kept, so that noise about 0 does not acquire a positive mean.
                 let squared = reflectance * reflectance.abs();
                 if squared.is_finite() {
                     self.samples.push(Sample {
                         at: [row, column],
                         squared,
-                        // Noise of R² is 2R times that of R. The floor is for that of quantisation.
+                        // The noise of R² is 2R times that of R. The constant term accounts for
+                        // quantisation.
                         weight: 1.0 / (squared.abs() + 0.05),
                     });
                 }
@@ -92,7 +94,7 @@ impl<T: PixelScalar> ProfileBuffers<T> {
                 let at = [row, column];
                 if !self.mask[at] {
                     let squared = profile.squared_reflectance(at);
-                    // The fitted contour decides which of the boundary's pixels are inside.
+                    // The fitted contour decides which of the boundary pixels are inside.
                     self.mask[at] = squared > 0.0;
                     self.image[at] = lighting.intensity(T::of(squared.clamp(0.0, 1.0).sqrt()));
                 }
@@ -102,7 +104,7 @@ impl<T: PixelScalar> ProfileBuffers<T> {
     }
 }
 
-/// A pixel that the profile is fitted to.
+/// A pixel used for the fit of the profile.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
     at: [usize; 2],
@@ -111,22 +113,23 @@ struct Sample {
     weight: f64,
 }
 
-/// R² = c·(1, x, y, x², xy, y²), x and y from the middle of the box in units of its longer side.
+/// R² = c·(1, x, y, x², xy, y²), with x and y from the middle of the box in units of its longer
+/// side.
 #[derive(Debug)]
 pub(super) struct Profile {
     coefficients: Vector6<f64>,
     middle: [f64; 2],
     unit: f64,
-    /// How R² depends on the quadratic, where it is not equal to it.
+    /// R² as a function of the quadratic, if the two are not equal.
     bend: Option<Bend>,
 }
 
-/// Powers of x and y of the coefficients.
+/// Powers of x and y that belong to the coefficients.
 const POWERS: [[usize; 2]; 6] = [[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2]];
 
 impl Profile {
-    /// Weighted least squares over the samples, row by row. `None` for too few pixels or too poor a
-    /// fit.
+    /// Weighted least squares over the samples, row by row. `None` if the pixels are too few or the
+    /// fit is too poor.
     fn fit(samples: &[Sample], area: BoundingBox) -> Option<Self> {
         // Four for each of the six coefficients.
         if samples.len() < 24 {
@@ -147,7 +150,7 @@ impl Profile {
         });
         let side = Vector6::from_fn(|i, _| moments.weighted[POWERS[i][1]][POWERS[i][0]]);
         profile.coefficients = matrix.cholesky()?.solve(&side);
-        // A contact is brightest in the middle, so that R² curves downwards along both axes.
+        // A contact is brightest in the middle, so that R² has a maximum along both axes.
         let curved_down = profile.coefficients[3] < 0.0 && profile.coefficients[5] < 0.0;
         let top = profile.top().filter(|top| curved_down && *top > 0.0)?;
         let mean = side[0] / matrix[(0, 0)];
@@ -157,11 +160,11 @@ impl Profile {
             let quadratic = profile.quadratic(sample.at);
             residual += sample.weight * (sample.squared - quadratic).powi(2);
             variance += sample.weight * (sample.squared - mean).powi(2);
-            // s is 0 at the top and 1 on the quadratic's contour.
+            // s is 0 at the top and 1 on the contour of the quadratic.
             means.add(1.0 - quadratic / top, sample.squared, sample.weight);
         }
-        // Noise of two grey levels in 200 leaves 0.98 of the variance of a round contact of 19
-        // pixels explained. A flat or textured contact has nothing to do with an ellipse.
+        // With noise of two grey levels in 200, 0.98 of the variance of a round contact of 19
+        // pixels is explained. A flat or textured contact does not follow an ellipse.
         if residual > 0.1 * variance {
             return None;
         }
@@ -169,7 +172,7 @@ impl Profile {
         Some(profile)
     }
 
-    /// Sums over the samples. Those of a row are of powers of x alone.
+    /// Sums over the samples. The sums over a row contain only powers of x.
     fn moments(&self, samples: &[Sample]) -> Moments {
         let mut moments = Moments::default();
         for row in samples.chunk_by(|a, b| a.at[0] == b.at[0]) {
@@ -191,7 +194,7 @@ impl Profile {
         moments
     }
 
-    /// The quadratic's greatest value. `None` without one.
+    /// The maximum of the quadratic. `None` if it has no maximum.
     fn top(&self) -> Option<f64> {
         let c = &self.coefficients;
         let determinant = 4.0 * c[3] * c[5] - c[4] * c[4];
@@ -199,7 +202,7 @@ impl Profile {
         (determinant > 0.0).then_some(c[0] - drop)
     }
 
-    /// The quadratic with its derivatives by x and y.
+    /// The quadratic with its derivatives with respect to x and y.
     #[inline]
     pub(super) fn quadratic_and_gradient(&self, at: [usize; 2]) -> (f64, [f64; 2]) {
         let [x, y] = self.place(at);
@@ -209,7 +212,7 @@ impl Profile {
         (self.quadratic_at([x, y]), [along_x, along_y])
     }
 
-    /// A pixel's x and y.
+    /// x and y of a pixel.
     #[inline]
     fn place(&self, [row, column]: [usize; 2]) -> [f64; 2] {
         [
@@ -243,7 +246,7 @@ struct Moments {
 }
 
 impl Moments {
-    /// Adds a row's sums of powers of x.
+    /// Adds the sums over a row of powers of x.
     fn add(&mut self, y: f64, plain: [f64; 5], weighted: [f64; 3]) {
         let mut power = 1.0;
         for j in 0..5 {
@@ -260,10 +263,10 @@ impl Moments {
     }
 }
 
-/// Ellipses on which R² is averaged. A profile hardly bends across one.
+/// Number of ellipses on which R² is averaged. The curvature of a profile within one is negligible.
 const ELLIPSES: usize = 128;
 
-/// Weighted means of R² over s = 1 − q/top, with q the quadratic profile.
+/// Weighted means of R² as a function of s = 1 − q/top, with q the quadratic profile.
 #[derive(Debug)]
 struct RadialMeans {
     /// Σ w, Σ w s, Σ w R², Σ w R⁴.
@@ -287,7 +290,7 @@ impl RadialMeans {
         }
     }
 
-    /// Weight, mean s and mean R² of every ellipse that has pixels.
+    /// Weight, mean s and mean R² of every ellipse that contains pixels.
     fn filled(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
         let filled = self.sums.iter().filter(|sum| sum[0] > 0.0);
         filled.map(|sum| [sum[0], sum[1] / sum[0], sum[2] / sum[0]])
@@ -300,26 +303,28 @@ impl RadialMeans {
     }
 }
 
-/// Samples of a contact of 25 pixels' radius. Smoothing, of up to two pixels, itself bends the
-/// profile of a smaller one by more than a hundredth: noise has to be exceeded there.
+/// Number of samples of a contact of 25 pixels' radius. On smaller contacts the smoothing by up to
+/// two pixels alone bends the profile by more than a hundredth. There the bend must exceed the
+/// noise.
 const ENOUGH: usize = 2000;
 
-/// How R² depends on a quadratic profile.
+/// R² as a function of a quadratic profile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Bend {
-    /// The quadratic's greatest value.
+    /// The maximum of the quadratic.
     top: f64,
     /// A, ρ²/s and c.
     parameters: Vector3<f64>,
 }
 
 impl Bend {
-    /// Gauss–Newton from the quadratic itself. `None` where the bend explains less than half of
-    /// `residual`, the weighted squares of the quadratic's misfit.
+    /// Gauss–Newton from the quadratic itself. `None` if the bend explains less than half of
+    /// `residual`, the weighted squared residuals of the quadratic.
     ///
-    /// Of [`ENOUGH`] samples and more, half of what the means along the ellipses leave is enough.
-    /// The scatter about the means is noise: judged by all of `residual`, one and the same contact
-    /// is bent in one frame and not in the next, and its height jumps by 5 %.
+    /// With [`ENOUGH`] samples or more, it is enough to explain half of the residual of the means
+    /// along the ellipses, because the scatter about the means is noise. With all of `residual` as
+    /// the criterion, the same contact would be bent in one frame and not in the next, and its
+    /// height would jump by 5 %.
     fn fit(means: &RadialMeans, top: f64, residual: f64, samples: usize) -> Option<Self> {
         let mut bend = Self {
             top,
@@ -343,14 +348,14 @@ impl Bend {
             false => bent < 0.5 * (residual - noise),
         };
         let [_, scale, c] = bend.parameters.into();
-        // Beyond these the fit has left what the inside determines.
+        // Beyond these limits the fit disagrees with the inside.
         let plausible = (scale - 1.0).abs() < 0.2 && c.abs() < 0.6;
-        // Noise of a grey level in 200 on Hertz's profile loses nothing, contacts by finite
-        // elements lose nine tenths.
+        // For Hertz's profile with noise of one grey level in 200, the bend explains nothing of the
+        // residual. For contacts computed by finite elements it explains nine tenths.
         (plausible && explains).then_some(bend)
     }
 
-    /// R² where the quadratic is `quadratic`. Negative outside the contour.
+    /// R² at the value `quadratic`. It is negative outside the contour.
     fn squared_reflectance(&self, quadratic: f64) -> f64 {
         self.value(1.0 - quadratic / self.top)
     }
@@ -361,7 +366,7 @@ impl Bend {
         amplitude * (1.0 - rho2) * (1.0 - c * rho2).powi(2)
     }
 
-    /// Derivatives by A, ρ²/s and c.
+    /// Derivatives with respect to A, ρ²/s and c.
     fn gradient(&self, s: f64) -> Vector3<f64> {
         let [amplitude, scale, c] = self.parameters.into();
         let rho2 = scale * s;
@@ -372,8 +377,8 @@ impl Bend {
     }
 }
 
-/// The pixels of a mask's box with a border around it, row by row. Beyond the frame nothing is
-/// inside.
+/// The pixels of a mask's box with a border around it, row by row. Outside the frame no pixel is
+/// inside the mask.
 #[derive(Debug, Default)]
 struct Discs {
     padded: Vec<bool>,
@@ -382,7 +387,7 @@ struct Discs {
 }
 
 impl Discs {
-    /// Takes the mask's pixels in a box, outside of which the mask has none.
+    /// Reads the pixels of the mask in a box that contains all of them.
     fn load(&mut self, mask: ArrayView2<'_, bool>, area: BoundingBox) {
         let columns = area.columns();
         self.width = columns + 2 * REACH;
@@ -398,17 +403,17 @@ impl Discs {
         }
     }
 
-    /// The pixels of a row of the box whose disc lies wholly in the mask.
+    /// The pixels of a row of the box whose disc lies completely in the mask.
     fn inside(&mut self, row: usize) -> &[bool] {
         self.combine(row, true, |all, pixel| all & pixel)
     }
 
-    /// The pixels of a row of the box whose disc meets the mask.
+    /// The pixels of a row of the box whose disc overlaps the mask.
     fn reached(&mut self, row: usize) -> &[bool] {
         self.combine(row, false, |any, pixel| any | pixel)
     }
 
-    /// Combines the pixels of every disc of a row, one place in the disc after the other.
+    /// Combines the pixels of every disc of a row, one position of the disc after the other.
     fn combine(&mut self, row: usize, start: bool, with: impl Fn(bool, bool) -> bool) -> &[bool] {
         let columns = self.width - 2 * REACH;
         self.result.clear();
@@ -428,7 +433,7 @@ impl Discs {
     }
 }
 
-/// How far the disc reaches to both sides, so many rows from its middle.
+/// Half width of the disc at the distance `down`, in rows from its centre.
 fn half_width(down: usize) -> usize {
     let beside = |right: &usize| ((down * down + right * right) as f64) <= RING_PX * RING_PX;
     (1..=REACH).take_while(beside).count()
@@ -439,7 +444,7 @@ mod tests {
     use super::*;
 
     /// Means of R² = (1 − ρ²)(1 − cρ²)² plus `noise` of alternating sign, for a quadratic whose
-    /// contour lies at ρ² = `contour`.
+    /// contour is at ρ² = `contour`.
     fn means(c: f64, contour: f64, noise: f64) -> (RadialMeans, f64) {
         let (mut means, mut left) = (RadialMeans::default(), 0.0);
         for k in 0..4000_u32 {
@@ -457,7 +462,7 @@ mod tests {
         for c in [-0.3, -0.1, 0.1, 0.15] {
             let (means, left) = means(c, 1.03, 1e-3);
             let bend = Bend::fit(&means, 1.0, left, 4000).unwrap();
-            // Means over an ellipse of 1/128 are off by its curvature, 1e-5.
+            // The curvature of R² changes a mean over an ellipse of width 1/128 by 1e-5.
             let expected = Vector3::new(1.0, 1.03, c);
             assert!((bend.parameters - expected).amax() < 1e-3, "{c}: {bend:?}");
             assert!(bend.squared_reflectance(1.0 - 1.0 / 1.03).abs() < 1e-3);
@@ -466,7 +471,7 @@ mod tests {
 
     #[test]
     fn noise_hides_no_bend_of_a_large_contact() {
-        // Noise of a tenth of the peak leaves more than the bend explains.
+        // With noise of a tenth of the peak, the residual is larger than the bend explains.
         let (means, left) = means(0.15, 1.03, 0.1);
         let bend = Bend::fit(&means, 1.0, left, ENOUGH).unwrap();
         // 0.1 over the 37 samples of an ellipse, and over 109 ellipses.
