@@ -3,13 +3,14 @@
 #[cfg(feature = "ndarray")]
 use ndarray::{ArrayView2, ArrayViewMut2, Axis, Slice};
 
-/// A rectangle of pixels, half open: rows `row_start..row_end`, columns `column_start..column_end`.
+/// A rectangle of pixels, half open: rows `row_start..row_end` and columns
+/// `column_start..column_end`.
 ///
 /// ```
 /// use tactile_core::BoundingBox;
 ///
 /// let contact = BoundingBox { row_start: 2, row_end: 5, column_start: 0, column_end: 4 };
-/// // A margin of one pixel, clipped to a frame of 5 × 20.
+/// // A margin of one pixel, clipped to a frame of 5 × 20 pixels.
 /// let wider = contact.grown(1, (5, 20));
 /// assert_eq!((wider.rows(), wider.columns()), (4, 5));
 /// ```
@@ -43,7 +44,7 @@ impl BoundingBox {
         }
     }
 
-    /// The smallest box that holds the true pixels of a mask. `None` if there are none.
+    /// The smallest box that contains the true pixels of a mask. `None` if there are none.
     ///
     /// ```
     /// use tactile_core::BoundingBox;
@@ -56,8 +57,8 @@ impl BoundingBox {
     pub fn of_mask(mask: ArrayView2<'_, bool>) -> Option<Self> {
         let mut bounds: Option<Self> = None;
         for (row, line) in mask.outer_iter().enumerate() {
-            // Most rows of a large frame are empty. A fold without an early end is computed in wide
-            // instructions.
+            // Most rows of a large frame are empty. A fold without an early exit is computed with
+            // SIMD instructions.
             if let Some(line) = line.to_slice()
                 && !line.iter().fold(false, |any, &inside| any | inside)
             {
@@ -96,7 +97,7 @@ impl BoundingBox {
         self.rows() * self.columns()
     }
 
-    /// Row and column of its pixels, in reading order.
+    /// Row and column of each pixel of the box, in reading order.
     ///
     /// ```
     /// use tactile_core::BoundingBox;
@@ -117,7 +118,7 @@ impl BoundingBox {
     /// ```
     #[must_use]
     pub fn centre(&self) -> (f64, f64) {
-        // Pixel centres have whole coordinates, and `to` is one past the last.
+        // Pixel centres have integer coordinates, and `to` is one past the last pixel.
         let half = |from: usize, to: usize| 0.5 * ((from + to) as f64 - 1.0);
         (
             half(self.column_start, self.column_end),
@@ -152,7 +153,7 @@ impl BoundingBox {
         image
     }
 
-    /// The smallest box that holds both.
+    /// The smallest box that contains both boxes.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self {

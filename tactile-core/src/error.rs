@@ -1,13 +1,13 @@
-//! The failure of a user's own stage.
+//! The failure of a user-defined stage.
 
 use std::error::Error;
 use std::fmt::{self, Display};
 use std::sync::Arc;
 
-/// The failure of a stage that a user has written, as the error types of the workspace carry it.
+/// The failure of a user-defined stage, as part of the error types of the workspace.
 ///
-/// Cheap to clone. Two are equal if their messages are. It stands for the user's own error in a
-/// chain of sources: its message is that error's, and its source is that error's source.
+/// It is cheap to clone, and two failures are equal if their messages are. It is transparent in a
+/// chain of sources: its message and its source are those of the user's error.
 ///
 /// ```
 /// use std::error::Error;
@@ -22,12 +22,12 @@ use std::sync::Arc;
 pub struct CustomError(Arc<dyn Error + Send + Sync>);
 
 impl CustomError {
-    /// Carries an error, or a message.
+    /// Wraps an error or a message.
     pub fn new(error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
         Self(Arc::from(error.into()))
     }
 
-    /// The user's own error.
+    /// The user's error.
     #[must_use]
     pub fn get_ref(&self) -> &(dyn Error + Send + Sync + 'static) {
         &*self.0
@@ -36,7 +36,7 @@ impl CustomError {
 
 impl PartialEq for CustomError {
     fn eq(&self, other: &Self) -> bool {
-        // The boxed errors have no type in common that could be compared.
+        // The boxed errors have no common type that could be compared.
         self.to_string() == other.to_string()
     }
 }
@@ -53,7 +53,7 @@ impl Error for CustomError {
     }
 }
 
-/// As its message.
+/// Serialises the message.
 #[cfg(feature = "serde")]
 impl serde::Serialize for CustomError {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

@@ -1,4 +1,4 @@
-//! A number with its standard error, and the interval that follows from both.
+//! A number with its standard error, and the interval that follows from them.
 
 #[cfg(feature = "intervals")]
 use crate::statistics::quantile_95;
@@ -14,7 +14,7 @@ use std::ops::Mul;
 /// use tactile_core::Estimate;
 /// let force_n = Estimate::new(1.2, 0.003);
 /// assert_eq!(format!("{force_n} N"), "1.2 ± 0.003 N");
-/// // In another unit: millinewtons.
+/// // Converted to millinewtons.
 /// assert_eq!((force_n * 1e3).standard_error, 3.0);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -27,14 +27,14 @@ use std::ops::Mul;
 pub struct Estimate {
     /// The value.
     pub value: f64,
-    /// Standard deviation of the value over repetitions. Zero where it is unknown or negligible.
+    /// Standard deviation of the value over repetitions: zero if it is unknown or negligible.
     pub standard_error: f64,
-    /// Degrees of freedom of a standard error that was itself estimated: pairs less parameters of a
-    /// calibration, parts of a jackknife less one. `None` where the error is known.
+    /// Degrees of freedom of an estimated standard error: pairs minus parameters of a calibration,
+    /// or parts of a jackknife minus one. `None` if the standard error is known.
     pub degrees_of_freedom: Option<f64>,
 }
 
-/// An estimate as a file holds it, before it is validated.
+/// An estimate as stored in a file, before validation.
 #[cfg(feature = "serde")]
 #[derive(serde::Deserialize)]
 struct StoredEstimate {
@@ -59,7 +59,7 @@ impl TryFrom<StoredEstimate> for Estimate {
 }
 
 impl Estimate {
-    /// A value with its standard error.
+    /// Creates an estimate from a value and its standard error.
     #[must_use]
     pub const fn new(value: f64, standard_error: f64) -> Self {
         Self {
@@ -69,7 +69,7 @@ impl Estimate {
         }
     }
 
-    /// A value whose error is negligible.
+    /// Creates an estimate with a negligible error.
     ///
     /// ```
     /// use tactile_core::Estimate;
@@ -80,7 +80,8 @@ impl Estimate {
         Self::new(value, 0.0)
     }
 
-    /// A value with its variance. Rounding may leave a variance below zero, which counts as zero.
+    /// Creates an estimate from a value and its variance. A variance below zero, which rounding may
+    /// cause, counts as zero.
     ///
     /// ```
     /// use tactile_core::Estimate;
@@ -91,8 +92,8 @@ impl Estimate {
         Self::new(value, variance.max(0.0).sqrt())
     }
 
-    /// With the degrees of freedom of a standard error that was estimated from few repetitions.
-    /// Fewer degrees make a wider interval.
+    /// Sets the degrees of freedom of a standard error that was estimated from few repetitions.
+    /// Fewer degrees of freedom give a wider interval.
     ///
     /// ```
     /// use tactile_core::Estimate;
@@ -106,7 +107,7 @@ impl Estimate {
         self
     }
 
-    /// The standard error as a share of the value's magnitude.
+    /// The standard error divided by the magnitude of the value.
     ///
     /// ```
     /// use tactile_core::Estimate;
@@ -117,11 +118,11 @@ impl Estimate {
         self.standard_error / self.value.abs()
     }
 
-    /// Itself, if its error is one.
+    /// Returns the estimate if it is valid.
     ///
     /// # Errors
-    /// [`InvalidOption`] for a value or an error that is not finite, an error below zero, and
-    /// degrees of freedom that are not above zero.
+    /// [`InvalidOption`] for a value or a standard error that is not finite, a standard error below
+    /// zero, and degrees of freedom that are not above zero.
     ///
     /// ```
     /// use tactile_core::Estimate;
@@ -139,15 +140,16 @@ impl Estimate {
         Ok(self)
     }
 
-    /// The symmetric 95 % interval, value ± t·standard error, with t of Student's distribution
-    /// where the degrees of freedom are known and of the normal distribution otherwise. Without
-    /// bounds where the error is none: below zero, NaN, or of no degree of freedom.
+    /// The symmetric 95 % interval, value ± t·standard error. The factor t is the quantile of
+    /// Student's distribution if the degrees of freedom are known, and of the normal distribution
+    /// otherwise. The interval is unbounded if the standard error is invalid (below zero or NaN) or
+    /// has no degrees of freedom.
     ///
     /// ```
     /// use tactile_core::Estimate;
     /// let interval = Estimate::new(10.0, 1.0).interval_95();
     /// assert!(interval.contains(11.9) && !interval.contains(12.0));
-    /// // Two pairs leave a line no degree of freedom, and its error is not known.
+    /// // A line through two pairs has no degree of freedom, and its error is unknown.
     /// let line = Estimate::new(10.0, 1.0).with_degrees_of_freedom(0.0);
     /// assert_eq!(line.interval_95().upper, None);
     /// ```
@@ -163,8 +165,7 @@ impl Estimate {
     }
 }
 
-/// Value, standard error, both ends of the 95 % interval and, where they are known, the degrees of
-/// freedom.
+/// Value, standard error, both ends of the 95 % interval and, if known, the degrees of freedom.
 #[cfg(feature = "serde")]
 impl serde::Serialize for Estimate {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -186,11 +187,11 @@ impl serde::Serialize for Estimate {
 impl Mul<f64> for Estimate {
     type Output = Self;
 
-    /// The value and its error in another unit.
+    /// The estimate in another unit.
     fn mul(self, factor: f64) -> Self {
         Self {
             value: self.value * factor,
-            // A change of sign turns the value round, its spread has none.
+            // A change of sign affects the value, but not its spread.
             standard_error: self.standard_error * factor.abs(),
             ..self
         }
@@ -205,13 +206,13 @@ impl Display for Estimate {
     }
 }
 
-/// A range that holds the truth with a stated probability.
+/// A range that contains the true value with a stated probability.
 ///
 /// ```
 /// use tactile_core::Interval;
 /// let at_least = Interval::new(20e3, None);
 /// assert!(at_least.contains(1e9) && !at_least.contains(19e3));
-/// // The ends are put in order.
+/// // The ends are sorted.
 /// assert_eq!(Interval::new(3.0, Some(1.0)), Interval::new(1.0, Some(3.0)));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -220,12 +221,12 @@ impl Display for Estimate {
 pub struct Interval {
     /// Lower limit.
     pub lower: f64,
-    /// Upper limit. `None` where the data set no upper limit.
+    /// Upper limit. `None` if the data determine no upper limit.
     pub upper: Option<f64>,
 }
 
 impl Interval {
-    /// The interval between two ends, the smaller one below.
+    /// The interval between two ends, of which the smaller becomes the lower limit.
     #[must_use]
     pub fn new(lower: f64, upper: Option<f64>) -> Self {
         match upper {
@@ -237,7 +238,7 @@ impl Interval {
         }
     }
 
-    /// Whether `x` lies within, ends included.
+    /// Whether `x` lies in the interval, ends included.
     #[must_use]
     pub fn contains(&self, x: f64) -> bool {
         x >= self.lower && self.upper.is_none_or(|upper| x <= upper)

@@ -11,14 +11,14 @@ use thiserror::Error;
 pub struct InvalidOption {
     /// Name of the option.
     pub name: &'static str,
-    /// The value given.
+    /// The given value.
     pub found: f64,
-    /// The values it may take.
+    /// The allowed values.
     pub expected: &'static str,
 }
 
 impl InvalidOption {
-    /// For a rule that [`Requirement`] does not have.
+    /// Creates an error for a rule that [`Requirement`] does not contain.
     #[must_use]
     pub const fn new(name: &'static str, found: f64, expected: &'static str) -> Self {
         Self {
@@ -29,7 +29,7 @@ impl InvalidOption {
     }
 }
 
-/// The rule that the value of an option has to satisfy. NaN satisfies none.
+/// A rule for the value of an option. NaN satisfies none.
 ///
 /// ```
 /// use tactile_core::Requirement;
@@ -40,24 +40,24 @@ impl InvalidOption {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Requirement {
-    /// Finite.
+    /// The value is finite.
     Finite,
-    /// Finite and greater than zero.
+    /// The value is finite and greater than zero.
     Positive,
-    /// Finite and not negative.
+    /// The value is finite and not negative.
     NonNegative,
-    /// Strictly between zero and one.
+    /// The value lies strictly between zero and one.
     OpenUnitInterval,
-    /// Between zero and one, both included.
+    /// The value lies between zero and one, both included.
     UnitInterval,
-    /// A whole number, at least one.
+    /// The value is an integer of at least one.
     AtLeastOne,
-    /// An odd whole number, at least one.
+    /// The value is an odd integer of at least one.
     Odd,
 }
 
 impl Requirement {
-    /// The value, if it satisfies the rule.
+    /// Returns the value if it satisfies the rule.
     ///
     /// # Errors
     /// [`InvalidOption`] with the name, the value and the rule.
@@ -81,8 +81,8 @@ impl Requirement {
                 value >= 1.0 && value.is_finite() && value.fract() == 0.0,
                 "a whole number of at least one",
             ),
-            // The remainder of an infinity is NaN, so this rule needs no test of finiteness of its
-            // own.
+            // The remainder of an infinity is NaN, so that this rule needs no test for finite
+            // values.
             Self::Odd => (value >= 1.0 && value % 2.0 == 1.0, "an odd whole number"),
         };
         if holds {

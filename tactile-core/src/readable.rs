@@ -2,8 +2,8 @@
 
 use std::fmt::{self, Display};
 
-/// A number as a person reads it: magnitudes below 10⁻⁴ and from 10⁷ on in powers of ten, so that
-/// none takes hundreds of digits.
+/// A number formatted for a message: magnitudes below 10⁻⁴ and from 10⁷ on are written in powers of
+/// ten, so that no number has hundreds of digits.
 ///
 /// ```
 /// use tactile_core::Readable;

@@ -1,10 +1,10 @@
 //! Two classes of pixels, and the connected regions of one of them.
 
-/// Otsu's threshold: it parts a histogram into two classes of the least variance, half way between
-/// their means. `None` for one class.
+/// Otsu's threshold: it divides a histogram into two classes with the least variance, and lies half
+/// way between their means. `None` if there is only one class.
 ///
 /// ```
-/// // Dark pixels of level 10, bright ones of level 90.
+/// // Dark pixels of level 10 and bright pixels of level 90.
 /// let mut histogram = [0.0; 256];
 /// (histogram[10], histogram[90]) = (700.0, 300.0);
 /// assert_eq!(tactile_core::otsu(&histogram, |k| k as f64), Some(50.0));
@@ -28,11 +28,12 @@ pub fn otsu(histogram: &[f64], level: impl Fn(usize) -> f64) -> Option<f64> {
     best.map(|(_, cut)| cut)
 }
 
-/// Regions of the pixels inside, row by row, that are connected by their sides: places of their
-/// pixels, the first in reading order first. What was given out is no longer inside. O(pixels).
+/// Regions of the pixels in `inside` (row by row) that are connected by their sides, each as the
+/// indices of its pixels, in reading order of the first pixel. The pixels of a returned region are
+/// removed from `inside`. O(pixels).
 ///
 /// ```
-/// // The second row's last two pixels touch the first row's by a corner alone.
+/// // The last two pixels of the second row touch those of the first row only by a corner.
 /// let mut inside = [true, false, false, false, true, true];
 /// let found: Vec<_> = tactile_core::regions(&mut inside, 3).collect();
 /// assert_eq!(found, [vec![0], vec![4, 5]]);

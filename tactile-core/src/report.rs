@@ -1,6 +1,6 @@
-//! How a computation went.
+//! How a computation ended, and its progress.
 
-/// Why an iteration ended. Not converging is no error.
+/// Why an iteration ended. A lack of convergence is not an error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",
@@ -9,37 +9,37 @@
 )]
 #[non_exhaustive]
 pub enum StopReason {
-    /// The method has no iterations: the answer is exact up to rounding.
+    /// The method is not iterative: the result is exact up to rounding.
     Direct,
     /// The last change or the residual is below the tolerance.
     #[default]
     Converged,
-    /// The residual is at rounding level: the data are free of noise.
+    /// The residual is at rounding level: the data contain no noise.
     Exact,
-    /// The limit of iterations was reached.
+    /// The maximum number of iterations was reached.
     IterationLimit,
     /// Further iterations no longer reduced the residual.
     Stagnated,
-    /// The caller's callback asked to stop.
+    /// The callback of the caller requested a stop.
     Cancelled,
-    /// The data determine less than was asked for: too few distinct points, or all on a line.
+    /// The data do not determine the result: the points are too few, or all lie on a line.
     Degenerate,
 }
 
-/// How far a long computation has come, as its callback receives it.
+/// Progress of a long computation, as passed to its callback.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Progress {
-    /// Steps done.
+    /// Completed steps.
     pub done: usize,
-    /// Steps expected in all: at most so many where the number is limited, an estimate otherwise.
+    /// Expected number of steps: the maximum if the number is limited, an estimate otherwise.
     pub total: usize,
-    /// Residual or change after the last step, where there is one.
+    /// Residual or change after the last step. `None` if the method has none.
     pub residual: Option<f64>,
 }
 
 impl Progress {
-    /// Progress without a residual.
+    /// Creates a progress without a residual.
     #[must_use]
     pub const fn new(done: usize, total: usize) -> Self {
         Self {
@@ -49,7 +49,7 @@ impl Progress {
         }
     }
 
-    /// With the residual after the last step.
+    /// Sets the residual after the last step.
     #[must_use]
     pub const fn with_residual(mut self, residual: f64) -> Self {
         self.residual = Some(residual);
@@ -57,7 +57,7 @@ impl Progress {
     }
 }
 
-/// The sign of the signal where an object touches.
+/// Sign of the signal in a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",
@@ -73,7 +73,7 @@ pub enum Polarity {
 }
 
 impl Polarity {
-    /// 1 where contact is brighter, −1 where it is darker.
+    /// 1 if contact is brighter, −1 if it is darker.
     ///
     /// ```
     /// use tactile_core::Polarity;

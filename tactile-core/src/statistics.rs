@@ -1,10 +1,10 @@
-//! Quantiles, of distributions and of values, and degrees of freedom.
+//! Quantiles of distributions and of values, and degrees of freedom.
 
 #[cfg(feature = "intervals")]
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
-/// Two-sided 95 % quantile of Student's t with so many degrees of freedom, of the normal
-/// distribution where `degrees` is `None` or not positive.
+/// Two-sided 95 % quantile of Student's t with `degrees` degrees of freedom, or of the normal
+/// distribution if `degrees` is `None`. It is infinite if `degrees` is not positive.
 ///
 /// ```
 /// use tactile_core::statistics::quantile_95;
@@ -18,12 +18,13 @@ use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 pub fn quantile_95(degrees: Option<f64>) -> f64 {
     const UPPER_TAIL: f64 = 0.975;
     let z = Normal::standard().inverse_cdf(UPPER_TAIL);
-    // A count that is NaN, zero or negative has no distribution: nothing bounds the value.
+    // A number of degrees that is NaN, zero or negative has no distribution, so that the value is
+    // unbounded.
     match degrees.and_then(|n| Some((n, StudentsT::new(0.0, 1.0, n).ok()?))) {
-        // The iteration behind the inverse loses digits with the degrees of freedom, and does not
-        // end for millions of them, as where a calibration is free of scatter. The expansion about
-        // the normal quantile is good to 1e-11 from a thousand on (Fisher & Cornish, Technometrics
-        // 2, 1960).
+        // The iteration for the inverse loses digits as the degrees of freedom increase, and does
+        // not end for millions of them (a calibration without scatter). The expansion about the
+        // normal quantile is accurate to 1e-11 from a thousand degrees on (Fisher and Cornish,
+        // Technometrics 2, 1960).
         Some((n, _)) if n > 1e3 => {
             let first = (z.powi(3) + z) / 4.0;
             let second = (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / 96.0;
@@ -36,8 +37,8 @@ pub fn quantile_95(degrees: Option<f64>) -> f64 {
     }
 }
 
-/// The value that exceeds a `share` of the values, ordered by [`f64::total_cmp`], in O(n). Without
-/// values it is 0. The values are left in another order.
+/// The value that exceeds the fraction `share` of the values in the order of [`f64::total_cmp`], in
+/// O(n). It is 0 without values. The values are reordered.
 ///
 /// ```
 /// use tactile_core::statistics::{median, quantile};
@@ -56,23 +57,24 @@ pub fn quantile(values: &mut [f64], share: f64) -> f64 {
         .1
 }
 
-/// The middle of the values, the upper one of two. See [`quantile`].
+/// The median of the values: the upper of two middle values. See [`quantile`].
 #[must_use]
 pub fn median(values: &mut [f64]) -> f64 {
     quantile(values, 0.5)
 }
 
 /// Degrees of freedom of a sum of independent variances vᵢ, each estimated with νᵢ degrees of
-/// freedom: those whose quantile is the mean of the parts' quantiles, t = Σ vᵢ t(νᵢ)/Σ vᵢ (Cochran
-/// & Cox, Experimental Designs, 2nd ed. 1957, §4.14). `None` where all are known.
+/// freedom. They are the degrees whose quantile is the weighted mean of the quantiles of the parts,
+/// t = Σ vᵢ t(νᵢ)/Σ vᵢ (Cochran and Cox, Experimental Designs, 2nd ed. 1957, §4.14). `None` if all
+/// variances are known.
 ///
-/// The usual rule of Welch and Satterthwaite lets 95 % intervals hold 87 to 93 % where a variance
-/// of one degree of freedom stands beside a known one, these hold 94 to 98 %. Quantiles are
-/// interpolated to 1 %.
+/// With the usual rule of Welch and Satterthwaite, 95 % intervals contain the true value in 87 to
+/// 93 % of cases if a variance with one degree of freedom is added to a known one. With this rule
+/// it is 94 to 98 %. Quantiles are interpolated to 1 %.
 ///
 /// ```
 /// use tactile_core::statistics::{effective_degrees_of_freedom, quantile_95};
-/// // One estimated variance beside a known one of the same size.
+/// // One estimated variance and a known one of the same size.
 /// let degrees = effective_degrees_of_freedom(&[(1.0, Some(4.0)), (1.0, None)]);
 /// let mean = 0.5 * (quantile_95(Some(4.0)) + quantile_95(None));
 /// assert!((quantile_95(degrees) / mean - 1.0).abs() < 0.01);
@@ -83,20 +85,21 @@ pub fn median(values: &mut [f64]) -> f64 {
 pub fn effective_degrees_of_freedom(parts: &[(f64, Option<f64>)]) -> Option<f64> {
     let counts = |part: &&(f64, Option<f64>)| part.0 > 0.0;
     let mut counted = parts.iter().filter(counts);
-    // One part alone keeps its count exactly, without the error of the interpolation.
+    // A single part keeps its degrees exactly, without the error of the interpolation.
     if let (Some((_, degrees)), None) = (counted.next(), counted.next()) {
         return *degrees;
     }
     let (mut total, mut estimated) = (0.0, 0.0);
     for (variance, degrees) in parts.iter().filter(counts) {
         total += variance;
-        // A known variance widens the sum, but its quantile is the normal one.
+        // A known variance contributes to the sum with the normal quantile.
         estimated += degrees.map_or(0.0, |n| variance * excess_of(n));
     }
     (estimated > 0.0).then(|| degrees_of(estimated / total))
 }
 
-/// Degrees of freedom, and how far the quantile of Student's t lies above the normal one.
+/// Degrees of freedom, and the difference between the quantile of Student's t and the normal
+/// quantile.
 const EXCESS: [(f64, f64); 11] = [
     (1.0, 10.746_241),
     (1.25, 6.067_987),
@@ -111,19 +114,21 @@ const EXCESS: [(f64, f64); 11] = [
     (200.0, 0.011_932),
 ];
 
-/// t(ν) less the normal quantile, by interpolation of logarithms. It falls as 1/ν at the end.
+/// t(ν) minus the normal quantile, by interpolation of logarithms. For many degrees it is
+/// proportional to 1/ν.
 fn excess_of(degrees: f64) -> f64 {
     interpolated(degrees, EXCESS.map(|(n, excess)| [n, excess]))
 }
 
-/// The inverse of [`excess_of`].
+/// Inverse of [`excess_of`].
 fn degrees_of(excess: f64) -> f64 {
     let mut points = EXCESS.map(|(n, excess)| [excess, n]);
     points.reverse();
     interpolated(excess, points)
 }
 
-/// Straight lines through the logarithms of points, and on beyond the first and the last.
+/// Piecewise linear interpolation of the logarithms of points, extrapolated beyond the first and
+/// the last.
 fn interpolated<const N: usize>(x: f64, points: [[f64; 2]; N]) -> f64 {
     let after = points.partition_point(|p| p[0] < x).clamp(1, N - 1);
     let [[x0, y0], [x1, y1]] = [points[after - 1], points[after]];
@@ -135,7 +140,7 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// Tables of Student's t, to the digits printed there.
+    /// Tables of Student's t, to the digits printed in them.
     #[test]
     fn quantiles_are_those_of_the_tables() {
         for (degrees, expected) in [
@@ -147,8 +152,8 @@ mod tests {
         }
     }
 
-    /// The sum of two estimates with ν = 4 each keeps the quantile of either. A part that vanishes
-    /// leaves the other's.
+    /// The sum of two estimates with ν = 4 has the quantile of either. A vanishing part does not
+    /// affect the quantile of the other.
     #[test]
     fn degrees_of_sums_are_those_of_the_mean_quantile() {
         for degrees in [1.0, 1.7, 4.0, 33.0, 5e3] {
@@ -159,10 +164,10 @@ mod tests {
         }
     }
 
-    /// Without a step where the expansion takes over, and with an end.
+    /// The quantile has no step at the transition to the expansion, and it has a limit.
     #[test]
     fn quantiles_of_many_degrees_reach_the_normal_one() {
-        // Two implementations at one place: the iteration has seven digits there.
+        // Two implementations at one point: the iteration is accurate to seven digits there.
         let step = quantile_95(Some(1001.0)) - quantile_95(Some(1000.0));
         // −z (z² + 1)/(4 n²) for a step of one.
         assert!((step + 2.4e-6).abs() < 5e-7, "{step:e}");

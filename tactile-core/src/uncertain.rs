@@ -1,14 +1,14 @@
-//! A number whose error is known by source.
+//! A number whose error is split by source.
 
 use crate::Estimate;
 use crate::statistics::effective_degrees_of_freedom;
 use std::fmt::{self, Display};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// What the error of a measured number comes from.
+/// Source of the error of a measured number.
 ///
-/// One source is one error wherever it stands: a pixel that is wrong by 0.3 % is wrong in every
-/// length that it measured. [`Noise`](Self::Noise) alone is another one in every number.
+/// Errors from one source are fully correlated: a pixel size that is wrong by 0.3 % affects every
+/// length in the same way. Only [`Noise`](Self::Noise) is independent in every number.
 ///
 /// ```
 /// use tactile_core::Source;
@@ -22,38 +22,39 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 )]
 #[non_exhaustive]
 pub enum Source {
-    /// Noise of a frame, or of a gauge.
+    /// Noise of a frame or of a force gauge.
     Noise,
     /// The calibration of light to force.
     Calibration,
-    /// What the object scatters beside what the calibrator scattered.
+    /// Difference in optical coupling between the object and the calibration object.
     Coupling,
-    /// The scale of the forces: the gauge's, and light that is uneven or brighter than it was.
+    /// The scale of the forces: of the gauge, and of light that is uneven or has changed since
+    /// calibration.
     Gain,
     /// Size of a pixel on the sensing surface.
     PixelSize,
-    /// The law of the contact's profile, and contacts that do not have it.
+    /// The assumed profile of the contact, and contacts that deviate from it.
     Profile,
     /// Size of the object.
     ObjectSize,
     /// Poisson's ratio of the object.
     PoissonRatio,
-    /// Moduli, thicknesses and Poisson's ratios of the guide's layers.
+    /// Moduli, thicknesses and Poisson's ratios of the layers of the guide.
     Guide,
     /// Adhesion of a ball.
     Adhesion,
     /// The contact law.
     Law,
-    /// One of a caller's own, numbered from 0 to 4. Higher numbers fall together with the last.
+    /// A source defined by the caller, numbered from 0 to 4. Higher numbers count as 4.
     Own(u8),
 }
 
-/// Sources of a caller's own that are kept apart.
+/// Number of sources defined by the caller.
 const OWN: usize = 5;
 const COUNT: usize = 11 + OWN;
 
 impl Source {
-    /// Every source, in the order of their places.
+    /// All sources, in the order of their indices.
     pub const ALL: [Self; COUNT] = [
         Self::Noise,
         Self::Calibration,
@@ -110,23 +111,23 @@ impl Display for Source {
     }
 }
 
-/// A value with the signed standard deviations that each [`Source`] gives it, propagated to first
-/// order: of y = f(x₁, x₂, …) the part of a source is Σ ∂f/∂xᵢ pᵢ, its parts pᵢ with their signs,
-/// and √(Σ (∂f/∂xᵢ pᵢ)²) of noise. No allocation.
+/// A value with the signed standard deviation from each [`Source`], propagated to first order. For
+/// y = f(x₁, x₂, …) the part of a source is Σ ∂f/∂xᵢ pᵢ, with the signed parts pᵢ of that source.
+/// The part of noise is √(Σ (∂f/∂xᵢ pᵢ)²). No allocation.
 ///
-/// Noise is taken to be another one in both operands: the square of a number is [`powf`](Self::powf),
-/// not its product with itself.
+/// Noise is assumed to be independent in the two operands: for the square of a number use
+/// [`powf`](Self::powf), not its product with itself.
 ///
 /// ```
 /// use tactile_core::{Source, Uncertain};
-/// // Two radii by the same pixels, whose size is known to 0.3 %.
+/// // Two radii measured with the same pixels, whose size is known to 0.3 %.
 /// let pixel_m = Uncertain::exact(20e-6).by_relative(Source::PixelSize, 3e-3);
 /// let [first, second] = [100.0, 120.0].map(|px| pixel_m * Uncertain::exact(px).by(Source::Noise, 0.1));
-/// // Their ratio does not depend on it: 0.1 % and 0.083 % of noise are left.
+/// // Their ratio does not depend on the size: only noise of 0.1 % and 0.083 % remains.
 /// let ratio = second / first;
 /// assert!((ratio.total().relative_error() - 1.3e-3).abs() < 2e-6);
 /// assert!(ratio.part(Source::PixelSize).abs() < 1e-15);
-/// // The area of a disc has twice the radius' error.
+/// // The relative error of the area of a disc is twice that of the radius.
 /// let area = first.powf(2.0) * std::f64::consts::PI;
 /// assert!((area.part(Source::PixelSize) / area.value - 6e-3).abs() < 1e-12);
 /// assert!(area.share(Source::PixelSize) > 0.89, "of its variance");
@@ -136,7 +137,7 @@ pub struct Uncertain {
     /// The value.
     pub value: f64,
     parts: [f64; COUNT],
-    /// Degrees of freedom of each part. Infinite where it is known.
+    /// Degrees of freedom of each part: infinite if the part is known.
     degrees: [f64; COUNT],
 }
 
@@ -147,7 +148,7 @@ impl Default for Uncertain {
 }
 
 impl Uncertain {
-    /// A value without error.
+    /// Creates a value without error.
     #[must_use]
     pub const fn exact(value: f64) -> Self {
         Self {
@@ -157,7 +158,8 @@ impl Uncertain {
         }
     }
 
-    /// An estimate whose error comes from one source. A negative error, which none can be, is NaN.
+    /// Creates a number from an estimate whose error comes from one source. A negative error is
+    /// invalid and becomes NaN.
     ///
     /// ```
     /// use tactile_core::{Estimate, Source, Uncertain};
@@ -172,21 +174,22 @@ impl Uncertain {
         Self::exact(estimate.value).by_estimated(source, error, degrees)
     }
 
-    /// With a standard deviation from a source, its sign that of the change which a positive error
-    /// of the source makes. One beside another of the same source is independent of it: the squares
-    /// add up.
+    /// Adds a standard deviation from a source. Its sign is that of the change of the value with a
+    /// positive error of the source. If there is already a part of the same source, the two are
+    /// independent: their squares add up.
     #[must_use]
     pub fn by(self, source: Source, standard_deviation: f64) -> Self {
         self.by_estimated(source, standard_deviation, None)
     }
 
-    /// As [`by`](Self::by), relative to the value.
+    /// Like [`by`](Self::by), relative to the value.
     #[must_use]
     pub fn by_relative(self, source: Source, standard_deviation: f64) -> Self {
         self.by(source, standard_deviation * self.value)
     }
 
-    /// As [`by`](Self::by), the standard deviation itself estimated with these degrees of freedom.
+    /// Like [`by`](Self::by), but for a standard deviation that was estimated with these degrees of
+    /// freedom.
     #[must_use]
     pub fn by_estimated(mut self, source: Source, sd: f64, degrees: Option<f64>) -> Self {
         let place = source.place();
@@ -209,8 +212,8 @@ impl Uncertain {
         Some(self.degrees[source.place()]).filter(|n| *n != f64::INFINITY)
     }
 
-    /// The sources that give an error, with their signed standard deviations: the budget of the
-    /// number.
+    /// The sources with an error and their signed standard deviations: the uncertainty budget of
+    /// the number.
     ///
     /// ```
     /// use tactile_core::{Source, Uncertain};
@@ -223,8 +226,8 @@ impl Uncertain {
         all.filter(|(_, part)| *part != 0.0)
     }
 
-    /// With no more than this standard deviation from a source: what exceeds it counts as noise. So
-    /// a number states which part of an error it has in common with others.
+    /// Limits the standard deviation from a source to `limit`; the excess counts as noise. This
+    /// separates the part of an error that the number has in common with others.
     ///
     /// ```
     /// use tactile_core::{Source, Uncertain};
@@ -242,7 +245,7 @@ impl Uncertain {
         self.by_estimated(Source::Noise, excess, degrees)
     }
 
-    /// The same value without the error from a source.
+    /// The number without the error from a source.
     ///
     /// ```
     /// use tactile_core::{Source, Uncertain};
@@ -259,18 +262,18 @@ impl Uncertain {
     /// The standard error from all sources.
     #[must_use]
     pub fn standard_error(&self) -> f64 {
-        // Most sources give no part, and `hypot` costs more than the test.
+        // Most sources have no part, and `hypot` is slower than the test.
         let parts = self.parts.iter().filter(|part| **part != 0.0);
         parts.fold(0.0, |sum: f64, part| sum.hypot(*part))
     }
 
-    /// The standard error as a share of the value's magnitude.
+    /// The standard error divided by the magnitude of the value.
     #[must_use]
     pub fn relative_error(&self) -> f64 {
         self.standard_error() / self.value.abs()
     }
 
-    /// Value and standard error, with the degrees of freedom that the sources' leave
+    /// Value and standard error, with the degrees of freedom that follow from those of the sources
     /// ([`effective_degrees_of_freedom`]).
     #[must_use]
     pub fn total(&self) -> Estimate {
@@ -283,7 +286,7 @@ impl Uncertain {
         total
     }
 
-    /// A source's share of the variance, from 0 to 1. Zero of an exact number.
+    /// Fraction of the variance from a source, from 0 to 1. It is zero for an exact number.
     #[must_use]
     pub fn share(&self, source: Source) -> f64 {
         let total = self.standard_error();
@@ -294,7 +297,7 @@ impl Uncertain {
         }
     }
 
-    /// The covariance with another number, which every source but noise gives.
+    /// The covariance with another number. All sources but noise contribute.
     ///
     /// ```
     /// use tactile_core::{Source, Uncertain};
@@ -312,7 +315,7 @@ impl Uncertain {
             .sum()
     }
 
-    /// f of the number, with its value and its slope there.
+    /// f of the number, from its value and its slope at the number.
     ///
     /// ```
     /// use tactile_core::{Source, Uncertain};
@@ -329,13 +332,13 @@ impl Uncertain {
         }
     }
 
-    /// The number to a power.
+    /// The number raised to a power.
     #[must_use]
     pub fn powf(self, power: f64) -> Self {
         self.map(|x| x.powf(power), |x| power * x.powf(power - 1.0))
     }
 
-    /// The mean of some numbers, 0/0 of none. Noise is averaged away, the other sources are not.
+    /// The mean of several numbers: 0/0 if there are none. Only noise is reduced by averaging.
     ///
     /// ```
     /// use tactile_core::{Source, Uncertain};
@@ -349,9 +352,9 @@ impl Uncertain {
         sum * (numbers.len() as f64).recip()
     }
 
-    /// a x + b y, with a value of its own: the form of every operation on two numbers.
+    /// a x + b y with a given `value`: the form of every operation on two numbers.
     fn combined(self, a: f64, other: Self, b: f64, value: f64) -> Self {
-        // One error, known as well as the part of it that is known least.
+        // A correlated error has the degrees of freedom of its least certain part.
         let mut sum = Self {
             value,
             parts: std::array::from_fn(|k| a * self.parts[k] + b * other.parts[k]),
@@ -378,7 +381,7 @@ fn beside(one: (f64, f64), other: (f64, f64)) -> (f64, f64) {
     (one.0.hypot(other.0), degrees.unwrap_or(f64::INFINITY))
 }
 
-/// An estimate of which no source is named: all of its error counts as noise.
+/// An estimate without a source: all of its error counts as noise.
 impl From<Estimate> for Uncertain {
     fn from(estimate: Estimate) -> Self {
         Self::of(estimate, Source::Noise)
@@ -438,7 +441,7 @@ impl Div for Uncertain {
     }
 }
 
-/// As the total, [`Estimate`]: `1.2 ± 0.003`.
+/// Like the total [`Estimate`]: `1.2 ± 0.003`.
 impl Display for Uncertain {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.total().fmt(f)
@@ -451,7 +454,7 @@ mod with_serde {
     use crate::Estimate;
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-    /// One source's part.
+    /// The part of one source.
     #[derive(Clone, Copy, Serialize, Deserialize)]
     struct Part {
         source: Source,
@@ -460,7 +463,7 @@ mod with_serde {
         degrees_of_freedom: Option<f64>,
     }
 
-    /// The total, and beside it the parts.
+    /// The total and its parts.
     #[derive(Serialize)]
     struct Written {
         #[serde(flatten)]
@@ -521,7 +524,7 @@ mod tests {
         let number = scale * Uncertain::exact(2.0).by(Source::Own(0), 0.01);
         assert_eq!((number / scale).part(Source::PixelSize), 0.0);
         assert!((number - scale * 2.0).part(Source::PixelSize).abs() < 1e-16);
-        // Noise does not.
+        // Noise does not cancel.
         let noisy = Uncertain::exact(3.0).by(Source::Noise, 0.3);
         assert!(((noisy - noisy).standard_error() - 0.18_f64.sqrt()).abs() < 1e-15);
         assert_eq!(noisy.covariance(&noisy), 0.0);

@@ -1,12 +1,13 @@
-//! Loops compiled for the instructions that the processor has.
+//! Loops that are compiled for the instruction sets of the processor.
 
-/// A loop: a closure, or a type of its own. Mark closure or `run`, and what it calls,
-/// `#[inline(always)]`: a function that is not inlined is compiled for the least processor.
+/// A loop: a closure or a user-defined type. Mark the closure or `run`, and the functions that it
+/// calls, `#[inline(always)]`: a function that is not inlined is compiled for the baseline
+/// processor.
 pub trait Loop {
-    /// What it gives.
+    /// Result of the loop.
     type Output;
 
-    /// Runs it.
+    /// Runs the loop.
     fn run(self) -> Self::Output;
 }
 
@@ -14,8 +15,8 @@ impl<R, F: FnMut() -> R> Loop for F {
     type Output = R;
     #[inline(always)]
     fn run(mut self) -> R {
-        // As `FnMut`: called as `FnOnce`, a closure goes through a function of the standard library
-        // that is not inlined.
+        // Called as `FnMut`: as `FnOnce`, a closure is called through a function of the standard
+        // library that is not inlined.
         self()
     }
 }
@@ -30,10 +31,10 @@ impl<L: Loop> pulp::WithSimd for Vectorised<L> {
     }
 }
 
-/// Runs a loop compiled for the widest instructions that the processor has.
+/// Runs a loop that is compiled for the widest SIMD instructions of the processor.
 ///
-/// The loop is plain Rust without fused operations: wider registers change its speed, not one bit
-/// of its result.
+/// The loop is plain Rust without fused operations: wider registers change its speed, but not its
+/// result.
 ///
 /// ```
 /// use tactile_core::vectorised;

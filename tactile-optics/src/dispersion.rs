@@ -5,13 +5,13 @@ use num_traits::Float;
 
 use crate::error::{OpticsError, within};
 
-/// A dispersion formula and the range of wavelengths it was fitted on. The wavelength λ is in
-/// micrometres inside the formulas.
+/// A dispersion formula with the range of wavelengths of its fit. The unit of the wavelength λ in
+/// the formulas is the micrometre.
 ///
 /// ```
 /// use tactile_optics::Dispersion;
 ///
-/// // A user's own material: Cauchy's formula through two measured indices.
+/// // A user-defined material: Cauchy's formula through two measured indices.
 /// let gel = Dispersion::Cauchy { coefficients: [1.40, 3.5e-3, 0.0], range_m: [0.45e-6, 0.65e-6] };
 /// assert!((gel.index(0.5e-6_f64)? - 1.414).abs() < 1e-12);
 /// # Ok::<(), tactile_optics::OpticsError>(())
@@ -40,21 +40,21 @@ pub enum Dispersion {
 impl Dispersion {
     /// PDMS (Dow Corning), 5 parts of base to 1 of curing agent: 1.4024 at 589 nm.
     ///
-    /// Least-squares Cauchy fit by us of 36 tabulated values, 0.40–0.75 µm, residual sd 1.8×10⁻⁴,
-    /// largest 5.5×10⁻⁴ (X. Zhang et al., Appl. Opt. 59 (2020) 2337–2344, as tabulated by
-    /// refractiveindex.info).
+    /// Least-squares Cauchy fit by the authors of this crate to 36 tabulated values, 0.40–0.75 µm,
+    /// with a residual sd of 1.8×10⁻⁴ and a maximum of 5.5×10⁻⁴ (X. Zhang et al., Appl. Opt. 59
+    /// (2020) 2337–2344, as tabulated by refractiveindex.info).
     pub const PDMS_5_1: Self = Self::Cauchy {
         coefficients: [1.391435, 3.8065e-3, 0.0],
         range_m: [0.40e-6, 0.75e-6],
     };
-    /// PDMS (Dow Corning), 10:1: 1.3950 at 589 nm. Residual sd 2.4×10⁻⁴, largest 4.6×10⁻⁴. Source
-    /// as for [`PDMS_5_1`](Self::PDMS_5_1).
+    /// PDMS (Dow Corning), 10:1: 1.3950 at 589 nm, with a residual sd of 2.4×10⁻⁴ and a maximum of
+    /// 4.6×10⁻⁴. The source is that of [`PDMS_5_1`](Self::PDMS_5_1).
     pub const PDMS_10_1: Self = Self::Cauchy {
         coefficients: [1.384091, 3.7890e-3, 0.0],
         range_m: [0.40e-6, 0.75e-6],
     };
-    /// PDMS (Dow Corning), 20:1: 1.4073 at 589 nm. Residual sd 1.6×10⁻⁴, largest 3.8×10⁻⁴. Source
-    /// as for [`PDMS_5_1`](Self::PDMS_5_1).
+    /// PDMS (Dow Corning), 20:1: 1.4073 at 589 nm, with a residual sd of 1.6×10⁻⁴ and a maximum of
+    /// 3.8×10⁻⁴. The source is that of [`PDMS_5_1`](Self::PDMS_5_1).
     pub const PDMS_20_1: Self = Self::Cauchy {
         coefficients: [1.395397, 4.1179e-3, 0.0],
         range_m: [0.40e-6, 0.75e-6],
@@ -91,18 +91,18 @@ impl Dispersion {
     /// The refractive index at a vacuum wavelength in metres.
     ///
     /// # Errors
-    /// [`OpticsError::OutOfRange`] outside the wavelengths of the fit.
+    /// [`OpticsError::OutOfRange`] for a wavelength outside the range of the fit.
     ///
     /// ```
     /// use tactile_optics::Dispersion;
     /// assert!((Dispersion::N_BK7.index(587.6e-9_f64)? - 1.5168).abs() < 1e-5);
-    /// // The fit of PDMS ends at 750 nm.
+    /// // The range of the fit of PDMS ends at 750 nm.
     /// assert!(Dispersion::PDMS_10_1.index(850e-9_f64).is_err());
     /// # Ok::<(), tactile_optics::OpticsError>(())
     /// ```
     pub fn index(&self, wavelength_m: f64) -> Result<f64, OpticsError> {
         let [shortest, longest] = self.range_m();
-        // The ends themselves may be rounded.
+        // A tolerance for wavelengths at the ends that are rounded.
         within(
             "wavelength in metres",
             wavelength_m,

@@ -2,7 +2,7 @@
 
 use core::fmt::{self, Display};
 
-/// The reason why an input was rejected.
+/// Reason why an input is invalid.
 ///
 /// ```
 /// use tactile_optics::{OpticsError, critical_angle};
@@ -16,19 +16,19 @@ use core::fmt::{self, Display};
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OpticsError {
-    /// A quantity lies outside the range that has a meaning (NaN always does).
+    /// A quantity lies outside its valid range (NaN always does).
     #[error("{quantity} is {found}, expected {}", Between(*minimum, *maximum))]
     OutOfRange {
         /// Name of the quantity.
         quantity: &'static str,
-        /// Smallest value allowed.
+        /// Smallest allowed value.
         minimum: f64,
-        /// Largest value allowed.
+        /// Largest allowed value.
         maximum: f64,
-        /// The value given.
+        /// The given value.
         found: f64,
     },
-    /// A list that must not be empty is.
+    /// A list is empty.
     #[error("{quantity} is empty")]
     Empty {
         /// Name of the list.
@@ -36,7 +36,7 @@ pub enum OpticsError {
     },
 }
 
-/// The numbers from one to another, in words where an end is the last of all numbers.
+/// The numbers from one to another, in words if an end is the extreme of all numbers.
 struct Between(f64, f64);
 
 impl Display for Between {
@@ -50,7 +50,7 @@ impl Display for Between {
     }
 }
 
-/// `found` if it lies in `minimum..=maximum`.
+/// Returns `found` if it lies in `minimum..=maximum`.
 pub(crate) fn within(
     quantity: &'static str,
     found: f64,

@@ -1,5 +1,5 @@
-//! The LED at the slab's edge: its radiation pattern, and the share of its light that a layer
-//! traps.
+//! The LED at the edge of the slab: its radiation pattern, and the fraction of its light that a
+//! layer traps.
 
 use core::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI};
 
@@ -9,13 +9,13 @@ use num_traits::Float;
 use crate::angle::Angle;
 use crate::error::{OpticsError, within};
 
-/// The directions that light may take: one plane, or all of space.
+/// The directions of light: in one plane or in space.
 ///
 /// ```
 /// use tactile_optics::{Geometry, Led, acceptance_angle};
 ///
-/// // In space more of the light leaves the axis sideways, within the layer's plane. Less of it is
-/// // lost than in a section.
+/// // In space more of the light is inclined within the plane of the layer. Less of it is lost than
+/// // in a section.
 /// let acceptance = acceptance_angle(1.38_f64, 1.0)?;
 /// let share = |geometry| Led::default().trapped_share(acceptance, geometry);
 /// let [section, volume] = [Geometry::Section, Geometry::Volume].map(share);
@@ -24,19 +24,20 @@ use crate::error::{OpticsError, within};
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Geometry {
-    /// A section: rays in the plane of the LED's axis and the slab's normal.
+    /// A section: rays in the plane of the LED axis and the normal of the slab.
     Section,
-    /// All of space.
+    /// All directions in space.
     #[default]
     Volume,
 }
 
-/// An LED facing the slab's edge: intensity ∝ cosᵐ θ up to a half angle, θ from its axis.
+/// An LED that faces the edge of the slab: intensity ∝ cosᵐ θ up to a half angle, with θ measured
+/// from its axis.
 ///
 /// ```
 /// use tactile_optics::{Geometry, Led, acceptance_angle};
 ///
-/// // A narrow LED keeps more of its light inside than one by Lambert's law.
+/// // More light of a narrow LED is trapped than of a Lambertian LED.
 /// let acceptance = acceptance_angle(1.38, 1.0)?;
 /// let leds = [Led::default(), Led::new(4.0, 60.0_f64.to_radians())?];
 /// let [wide, narrow] = leds.map(|led| led.trapped_share(acceptance, Geometry::Volume));
@@ -60,9 +61,9 @@ impl Default for Led {
 }
 
 impl Led {
-    /// Intensity ∝ cosᵐ θ for θ below `half_angle`. An exponent of 1 is Lambertian (the default),
-    /// one of 0 even. Data sheets state the angle α at which the intensity has halved: m = ln ½ /
-    /// ln cos α.
+    /// Creates an LED with intensity ∝ cosᵐ θ for θ below `half_angle`. An exponent of 1 is
+    /// Lambertian (the default), and 0 is uniform. Data sheets give the angle α of half the
+    /// intensity: m = ln ½ / ln cos α.
     ///
     /// # Errors
     /// [`OpticsError::OutOfRange`] for an exponent outside 0 to 1000 or a half angle outside (0,
@@ -81,12 +82,13 @@ impl Led {
         })
     }
 
-    /// The share of the LED's light that a layer of this acceptance angle traps, before losses at
-    /// the entry.
+    /// The fraction of the LED light that is trapped by a layer with this acceptance angle, before
+    /// losses at the entry.
     ///
-    /// In a section, ∫₀^θᵢ cosᵐ / ∫₀^h cosᵐ. In space a ray is trapped while its slope out of the
-    /// layer's plane is below S = sin θᵢ: of the directions at θ from the axis that is the part
-    /// (2/π) asin(min(1, S/sin θ)). Gauss–Legendre quadrature, some 10⁻¹² in `f64`.
+    /// In a section the fraction is ∫₀^θᵢ cosᵐ / ∫₀^h cosᵐ. In space a ray is trapped if its slope
+    /// relative to the plane of the layer is below S = sin θᵢ. This is the fraction (2/π)
+    /// asin(min(1, S/sin θ)) of the directions at θ from the axis. The Gauss–Legendre quadrature is
+    /// accurate to about 10⁻¹² in `f64`.
     ///
     /// ```
     /// use tactile_optics::{Geometry, Led, acceptance_angle};
@@ -96,18 +98,18 @@ impl Led {
     /// # Ok::<(), tactile_optics::OpticsError>(())
     /// ```
     pub fn trapped_share(&self, acceptance: Angle, geometry: Geometry) -> f64 {
-        // An LED narrower than the acceptance angle emits nothing beyond its own half angle.
+        // An LED narrower than the acceptance angle emits no light beyond its half angle.
         let limit = acceptance.radians.min(self.half_angle);
         if geometry == Geometry::Section {
             let intensity = |t: f64| t.cos().max(0.0).powf(self.exponent);
             return integral(0.0, limit, intensity) / integral(0.0, self.half_angle, intensity);
         }
-        // sin θ is the solid angle of a ring of directions about the axis, the 2π cancelled in the
-        // ratio.
+        // sin θ is the solid angle of a ring of directions about the axis. The factor 2π cancels in
+        // the ratio.
         let flux = |t: f64| t.cos().max(0.0).powf(self.exponent) * t.sin();
         let slope = acceptance.radians.sin();
-        // Beyond θᵢ the trapped part falls with an infinite slope. Substituting θ = θᵢ + t² removes
-        // it.
+        // Beyond θᵢ the trapped fraction decreases with an infinite slope at first. The
+        // substitution θ = θᵢ + t² removes it.
         let outer = |t: f64| {
             let theta = limit + t * t;
             let part = (slope / theta.sin()).min(1.0).asin() * FRAC_2_PI;
@@ -118,25 +120,25 @@ impl Led {
         trapped / integral(0.0, self.half_angle, flux)
     }
 
-    /// The direction that two numbers in [0, 1) stand for: components along the axis, across it in
-    /// the slab's plane, and along the slab's normal. Returned with the weight of the direction,
-    /// its share of the light but for a factor common to all.
+    /// Converts two numbers in [0, 1) to a direction: components along the axis, across it in the
+    /// plane of the slab, and along the normal of the slab. The weight of the direction is also
+    /// returned: its fraction of the light up to a common factor.
     pub(crate) fn direction(&self, u: f64, v: f64, geometry: Geometry) -> ([f64; 3], f64) {
         if geometry == Geometry::Section {
             // For a general m the integral of cosᵐ has no inverse in closed form. Angles are
-            // therefore even and carry the intensity as weight.
+            // therefore uniform and have the intensity as weight.
             let theta = (u + u - 1.0) * self.half_angle;
             return (
                 [theta.cos(), 0.0, theta.sin()],
                 theta.cos().max(0.0).powf(self.exponent),
             );
         }
-        // On the sphere the integral of cosᵐ θ sin θ inverts in closed form. All directions then
-        // weigh the same.
+        // On the sphere the integral of cosᵐ θ sin θ has an inverse in closed form. All directions
+        // then have the same weight.
         let power = self.exponent + 1.0;
         let edge = self.half_angle.cos().max(0.0).powf(power);
         let cosine = (1.0 - u * (1.0 - edge)).powf(power.recip());
-        // As a product, because 1 − cos² loses half of the digits near the axis.
+        // Written as a product, because 1 − cos² loses half of the digits near the axis.
         let sine = ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt();
         let (across, up) = ((v + v) * PI).sin_cos();
         ([cosine, sine * across, sine * up], 1.0)

@@ -8,34 +8,34 @@
 //! | [`fresnel`] | reflectance and transmittance, s, p and unpolarised |
 //! | [`normal_incidence`], [`led_cone`] | a stack of layers in its ambient |
 //! | [`Dispersion`] | refractive index of PDMS and borosilicate glass by wavelength |
-//! | [`Led`] | radiation pattern and the share of it that is trapped |
-//! | [`surface`] | the slab's deformed top and the object that touches it |
+//! | [`Led`] | radiation pattern and its trapped fraction |
+//! | [`surface`] | the deformed top of the slab and the touching object |
 //! | [`trace`](mod@trace) | ray tracing through the slab: the light budget of a press |
 //! | [`SensorSpecification`] | Table 1: grid elements, temporal and force resolution |
 //!
 //! # Conventions
-//! Angles in radians unless the name says degrees. Angles of incidence are measured from the normal
-//! of the interface, the LED's from its axis. Lengths in metres. Layers count from the object's
-//! side towards the glass, and their indices grow that way as in §3.3: 1.38, 1.39, 1.40, glass
-//! 1.41. Nothing allocates or needs the standard library.
+//! Angles are in radians unless the name contains degrees. Angles of incidence are measured from
+//! the normal of the interface, and those of the LED from its axis. Lengths are in metres. Layers
+//! are counted from the object to the glass, and their indices increase in this order, as in §3.3:
+//! 1.38, 1.39, 1.40, glass 1.41. The crate neither allocates nor needs the standard library.
 //!
 //! # Equations
-//! Equation numbers are the paper's. $n_i$ is a layer's index, $n_0$ the ambient's, $\theta$ an
-//! angle of incidence.
+//! Equation numbers are those of the paper. $n_i$ is the index of a layer, $n_0$ that of the
+//! ambient, and $\theta$ an angle of incidence.
 //!
-//! - Critical angle, and acceptance angle of light entering through the edge (1)–(4):
-//!   $\theta_c = \arcsin(n_0/n_i)$, $\theta_i = \arcsin(\sqrt{n_i^2 - n_0^2}/n_0)$. O(1) a layer.
-//! - Snell: $n \sin\theta$ is the same in every layer. Where it exceeds $n$ the field decays.
+//! - Critical angle, and acceptance angle of light that enters through the edge (1)–(4):
+//!   $\theta_c = \arcsin(n_0/n_i)$, $\theta_i = \arcsin(\sqrt{n_i^2 - n_0^2}/n_0)$. O(1) per layer.
+//! - Snell: $n \sin\theta$ is the same in every layer. If it exceeds $n$, the field decays.
 //! - Fresnel, amplitudes:
 //!   $r_s = \frac{n_1\cos\theta_1 - n_2\cos\theta_2}{n_1\cos\theta_1 + n_2\cos\theta_2}$ and
 //!   $r_p = \frac{n_2\cos\theta_1 - n_1\cos\theta_2}{n_2\cos\theta_1 + n_1\cos\theta_2}$.
 //!   Reflectances are their squares.
-//! - Stack at normal incidence, reflections added by intensity: $T = 1/(1 + \sum_j R_j/(1 - R_j))$.
-//!   O(layers).
+//! - Stack at normal incidence, with reflections added by intensity:
+//!   $T = 1/(1 + \sum_j R_j/(1 - R_j))$. O(layers).
 //! - Dispersion: Cauchy $n = a + b/\lambda^2 + c/\lambda^4$. Sellmeier
 //!   $n^2 = 1 + a + \sum_k B_k\lambda^2/(\lambda^2 - C_k)$.
-//! - LED: intensity $\propto \cos^m\theta$. Trace: O(rays × reflections), shares of the light that
-//!   add up to 1.
+//! - LED: intensity $\propto \cos^m\theta$. Trace: O(rays × reflections), with fractions of the
+//!   light that add up to 1.
 #![no_std]
 #![forbid(unsafe_code)]
 

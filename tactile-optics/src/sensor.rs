@@ -1,11 +1,11 @@
-//! The sensor's figures of merit (§3.4 and Table 1) from its parameters.
+//! The specification of the sensor (§3.4 and Table 1) from its parameters.
 
 #[cfg(not(feature = "std"))]
 use num_traits::Float;
 
 use crate::error::{OpticsError, within};
 
-/// The parameters from which a [`SensorSpecification`] follows.
+/// Parameters of a [`SensorSpecification`].
 ///
 /// ```
 /// use tactile_optics::{SensorParameters, SensorSpecification};
@@ -34,15 +34,15 @@ pub struct SensorParameters {
     pub frame_rate_hz: f64,
     /// Largest force in newtons.
     pub largest_force_n: f64,
-    /// Force over integrated pixel value, in newtons per grey level.
+    /// Force per integrated pixel value, in newtons per grey level.
     pub newton_per_grey: f64,
-    /// Standard deviation of a pixel's noise in grey levels.
+    /// Standard deviation of the pixel noise in grey levels.
     pub pixel_noise_grey: f64,
     /// Number of pixels that are summed for a force.
     pub summed_pixels: f64,
 }
 
-/// Resolution of a sensor in space, time and force.
+/// Spatial, temporal and force resolution of a sensor.
 ///
 /// ```
 /// use tactile_optics::{SensorParameters, SensorSpecification};
@@ -61,29 +61,30 @@ pub struct SensorParameters {
 /// )?;
 /// assert_eq!(sensor.grid_elements.round(), 6452.0);
 /// assert_eq!(sensor.temporal_resolution_s, 12.5e-3);
-/// // Three σ of the difference of two frames' sums over 100 × 100 pixels: 3 √2 · 100 grey levels
-/// // of 1 µN.
+/// // Three σ of the difference between the sums of two frames over 100 × 100 pixels: 3 √2 · 100
+/// // grey levels of 1 µN.
 /// assert!((sensor.force_resolution_n - 4.243e-4).abs() < 1e-7);
 /// assert_eq!(sensor.force_levels.floor(), 4714.0);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensorSpecification {
-    /// Pixels along a side: 6452 (6451.6) for the paper's 30 mm of 4.65 µm, where §3.4 prints 6415.
+    /// Pixels along a side: 6452 (6451.6) for the paper's 30 mm of 4.65 µm, for which §3.4 prints
+    /// 6415.
     pub grid_elements: f64,
     /// Seconds between frames: 12.5 ms at the paper's 80 frames per second.
     pub temporal_resolution_s: f64,
-    /// The smallest force distinguished from none, in newtons: k σ_pixel √pixels × √2 × newtons per
-    /// grey level, k the number of standard deviations asked for. The √2 is the reference frame's
-    /// noise, which is as large as the frame's.
+    /// The smallest force that differs from zero, in newtons: k σ_pixel √pixels × √2 × newtons per
+    /// grey level, with k the required number of standard deviations. The factor √2 accounts for
+    /// the noise of the reference frame, which equals that of the frame.
     pub force_resolution_n: f64,
-    /// Number of forces distinguished between none and the largest.
+    /// Number of distinguishable forces between zero and the largest.
     pub force_levels: f64,
 }
 
 impl SensorSpecification {
-    /// The specification of a sensor whose smallest force stands out by `sigmas` standard
-    /// deviations of the noise.
+    /// The specification of a sensor whose smallest force exceeds the noise by `sigmas` standard
+    /// deviations.
     ///
     /// # Errors
     /// [`OpticsError::OutOfRange`] for a parameter that is not positive and finite. The noise may
@@ -102,7 +103,8 @@ impl SensorSpecification {
             within(name, value, f64::MIN_POSITIVE, f64::MAX)?;
         }
         within("noise of a pixel", p.pixel_noise_grey, 0.0, f64::MAX)?;
-        // The variances of the frame and of the reference add, each that of the summed pixels.
+        // The variances of the frame and of the reference add up. Each is that of the summed
+        // pixels.
         let force_resolution_n =
             sigmas * p.pixel_noise_grey * (2.0 * p.summed_pixels).sqrt() * p.newton_per_grey;
         Ok(Self {

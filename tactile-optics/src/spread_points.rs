@@ -1,8 +1,9 @@
-//! Evenly spread points.
+//! Evenly distributed points.
 //!
 //! Points follow the additive recurrence with the powers of 1/φ_d, φ_d^(d+1) = φ_d + 1 (M. Roberts,
-//! "The unreasonable effectiveness of quasirandom sequences", 2018), in 64-bit fixed point, so that
-//! no precision is lost however many rays are shot. The seed shifts them.
+//! "The unreasonable effectiveness of quasirandom sequences", 2018). They are computed in 64-bit
+//! fixed point, so that the number of rays does not affect the precision. The seed shifts the
+//! points.
 
 /// Fixed-point steps for two and four dimensions.
 const STEPS_2: [f64; 4] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3, 0.0, 0.0];
@@ -31,10 +32,10 @@ impl Points {
         }
     }
 
-    /// The numbers of point `i`, in [0, 1).
+    /// The coordinates of point `i`, in [0, 1).
     pub(crate) fn point(&self, i: u64) -> [f64; 4] {
         core::array::from_fn(|k| {
-            // Wrapping at 2⁶⁴ takes the fractional part exactly, for any number of points.
+            // Overflow at 2⁶⁴ gives the exact fractional part, for any number of points.
             unit(self.shift[k].wrapping_add(self.steps[k].wrapping_mul(i + 1)))
         })
     }
@@ -45,8 +46,8 @@ pub(crate) fn unit(bits: u64) -> f64 {
     (bits >> 11) as f64 / 9_007_199_254_740_992.0
 }
 
-/// SplitMix64's finaliser (G. Steele, D. Lea, C. Flood, OOPSLA 2014): a 64-bit number scattered
-/// over all bits.
+/// SplitMix64's finaliser (G. Steele, D. Lea, C. Flood, OOPSLA 2014): a 64-bit number with all bits
+/// mixed.
 pub(crate) fn hash(x: u64) -> u64 {
     let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -1,9 +1,9 @@
-//! A stack of plane layers with the same ambient on both sides, given by the refractive indices
-//! from the object's side to the glass.
+//! A stack of plane layers with the same ambient on both sides, described by its refractive indices
+//! from the object to the glass.
 //!
 //! Critical, acceptance and propagation angles are per layer: call
 //! [`critical_angle`](crate::critical_angle), [`acceptance_angle`] or
-//! [`propagation`](crate::propagation) on the index wanted.
+//! [`propagation`](crate::propagation) with the index of the layer.
 
 use core::f64::consts::PI;
 
@@ -16,7 +16,7 @@ use crate::error::{OpticsError, index, within};
 /// ```
 /// use tactile_optics::normal_incidence;
 ///
-/// // A pane of glass: 4 % at each face; the light between the faces adds a little.
+/// // A pane of glass: 4 % at each face, and slightly more by the light between the faces.
 /// let pane = normal_incidence(&[1.5_f64], 1.0)?;
 /// assert!((pane.single_pass - 0.96 * 0.96).abs() < 1e-15);
 /// assert!((pane.transmittance - 12.0 / 13.0).abs() < 1e-15);
@@ -26,7 +26,7 @@ use crate::error::{OpticsError, index, within};
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct NormalIncidence {
-    /// Transmittance if what is reflected once is lost, Π(1 − Rⱼ).
+    /// Transmittance if reflected light is lost, Π(1 − Rⱼ).
     pub single_pass: f64,
     /// Transmittance with all reflections added by intensity, 1/(1 + Σ Rⱼ/(1 − Rⱼ)).
     pub transmittance: f64,
@@ -34,35 +34,34 @@ pub struct NormalIncidence {
     pub reflectance: f64,
 }
 
-/// The comparison of an LED's cone of light with the acceptance angles of a stack, from
-/// [`led_cone`].
+/// Comparison of the light cone of an LED with the acceptance angles of a stack, from [`led_cone`].
 ///
 /// ```
 /// use tactile_optics::led_cone;
 ///
 /// let cone = led_cone(&[1.38_f64, 1.41], 1.0, 150.0_f64.to_radians())?;
 /// assert!(!cone.trapped);
-/// // Six degrees too wide for the layer of 1.38.
+/// // The cone is six degrees too wide for the layer of 1.38.
 /// assert!((cone.margin.to_degrees() + 6.0211).abs() < 1e-4);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct LedCone {
-    /// Full angle of the LED's cone in radians.
+    /// Full angle of the LED cone in radians.
     pub full_angle: f64,
     /// The smallest acceptance angle of the layers.
     pub weakest: Angle,
-    /// The largest full angle trapped, twice the weakest layer's acceptance angle, less the cone's.
-    /// Negative: that much too wide. A cone of less than π inside a stack that traps every ray has
-    /// at least π less its own angle.
+    /// The largest trapped full angle, which is twice the smallest acceptance angle, minus the
+    /// angle of the cone. If it is negative, the cone is too wide by this angle. If the stack traps
+    /// every ray, the margin is at least π minus the angle of the cone.
     pub margin: f64,
     /// Whether every ray of the cone is trapped.
     pub trapped: bool,
 }
 
-/// Transmittance and reflectance at normal incidence of layers with these `indices`, ambient to
-/// ambient, without interference.
+/// Transmittance and reflectance at normal incidence of layers with these `indices`, from ambient
+/// to ambient, without interference.
 ///
 /// Rⱼ/(1 − Rⱼ) = (a − b)²/(4ab) and 1 − Rⱼ = 4ab/(a + b)² at the interface of indices a and b.
 /// O(layers).
@@ -74,7 +73,7 @@ pub struct LedCone {
 /// ```
 /// use tactile_optics::normal_incidence;
 ///
-/// // An index between the ambient's and the layer's on both faces halves the loss.
+/// // An index between those of the ambient and the layer, on both faces, halves the loss.
 /// let bare = normal_incidence(&[1.5_f64], 1.0)?;
 /// let coated = normal_incidence(&[1.5_f64.sqrt(), 1.5, 1.5_f64.sqrt()], 1.0)?;
 /// assert!(coated.reflectance < 0.55 * bare.reflectance);
@@ -86,7 +85,7 @@ pub fn normal_incidence(indices: &[f64], ambient: f64) -> Result<NormalIncidence
     let mut before = ambient;
     for after in indices.iter().copied().chain(core::iter::once(ambient)) {
         let (sum, step) = (before + after, before - after);
-        // Ratios stay below 1 where products of indices could overflow.
+        // Ratios stay below 1, whereas products of indices could overflow.
         single_pass *= 4.0 * (before / sum) * (after / sum);
         reflected += step / before * (step / after) / 4.0;
         before = after;
@@ -98,16 +97,16 @@ pub fn normal_incidence(indices: &[f64], ambient: f64) -> Result<NormalIncidence
     })
 }
 
-/// Whether the cone of an LED at the edge of layers with these `indices` is trapped by every layer:
-/// its full angle must stay under 2·min θᵢ.
+/// Whether every layer traps the cone of an LED at the edge of layers with these `indices`: the
+/// full angle of the cone must be below 2·min θᵢ.
 ///
 /// # Errors
-/// [`OpticsError::Empty`] without layers. [`OpticsError::OutOfRange`] for an index that is not
+/// [`OpticsError::Empty`] without layers; [`OpticsError::OutOfRange`] for an index that is not
 /// positive and finite, or a full angle outside 0 to π.
 ///
 /// ```
 /// use tactile_optics::led_cone;
-/// // The LED's cone must stay under 143.96° (143.9789 untruncated), the weakest layer's.
+/// // The cone must be below 143.96° (143.9789 untruncated), the limit of the weakest layer.
 /// let layers = [1.38_f64, 1.39, 1.40, 1.41];
 /// assert!(led_cone(&layers, 1.0, 140.0_f64.to_radians())?.trapped);
 /// assert!(!led_cone(&layers, 1.0, 150.0_f64.to_radians())?.trapped);
@@ -128,7 +127,7 @@ pub fn led_cone(indices: &[f64], ambient: f64, full_angle: f64) -> Result<LedCon
         full_angle,
         weakest,
         margin,
-        // A weakest layer that traps every ray has no limit to exceed, even for a cone of π and a
+        // If the weakest layer traps every ray, there is no limit, even for a cone of π and a
         // margin of 0.
         trapped: weakest.radians > 0.0 && (weakest.complement == 0.0 || margin > 0.0),
     })

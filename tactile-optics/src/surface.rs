@@ -1,4 +1,4 @@
-//! The top of the slab: its shape under load and the object that touches it.
+//! The top of the slab: its shape under load and the touching object.
 
 use core::f64::consts::FRAC_PI_2;
 
@@ -7,8 +7,8 @@ use num_traits::Float;
 
 use crate::error::{OpticsError, within};
 
-/// An object in optical contact with the slab: light that enters it is scattered back evenly or
-/// lost.
+/// An object in optical contact with the slab: light that enters it is scattered back uniformly or
+/// absorbed.
 ///
 /// ```
 /// use tactile_optics::surface::{Flat, TopSurface, Touched, TouchingObject};
@@ -22,18 +22,18 @@ use crate::error::{OpticsError, within};
 pub struct TouchingObject {
     /// Refractive index of the object.
     pub index: f64,
-    /// Share of the light entering the object that it scatters back, as a Lambertian emitter in the
-    /// slab's top layer.
+    /// Fraction of the light in the object that is scattered back, as by a Lambertian emitter in
+    /// the top layer of the slab.
     pub albedo: f64,
 }
 
-/// The shape of the slab's top. Coordinates in metres: x along the LED's axis from the lit edge, y
-/// across, z up from the undeformed top.
+/// Shape of the top of the slab. Coordinates are in metres: x along the LED axis from the lit edge,
+/// y across it, z up from the undeformed top.
 ///
 /// ```
 /// use tactile_optics::surface::{TopSurface, TouchingObject};
 ///
-/// /// A wedge pressed in from x = 10 mm to 20 mm.
+/// /// A wedge that is pressed in from x = 10 mm to 20 mm.
 /// struct Wedge;
 ///
 /// impl TopSurface for Wedge {
@@ -66,16 +66,16 @@ pub struct TouchingObject {
 pub trait TopSurface {
     /// Height above the undeformed top, in metres. Negative under load.
     fn height(&self, x: f64, y: f64) -> f64;
-    /// Its slopes along x and y.
+    /// Slopes of the surface along x and y.
     fn gradient(&self, x: f64, y: f64) -> [f64; 2];
-    /// A bound on the slope's size anywhere: rays step towards the surface no faster than it
-    /// allows, so that no intersection is missed.
+    /// Upper bound of the slope of the whole surface. It limits the steps of rays towards the
+    /// surface, so that no intersection is missed.
     fn steepest(&self) -> f64;
     /// The deepest point below the undeformed top, in metres, as a positive number.
     fn deepest(&self) -> f64;
-    /// The range of x outside which the top is flat and untouched.
+    /// The range of x outside which the top is flat and without contact.
     fn support(&self) -> [f64; 2];
-    /// The object that touches the slab at a point. `None` where the ambient does.
+    /// The object in contact with the slab at a point. `None` if the ambient is there.
     fn touching(&self, _x: f64, _y: f64) -> Option<TouchingObject> {
         None
     }
@@ -110,8 +110,8 @@ impl TopSurface for Flat {
     }
 }
 
-/// A round dimple z = −d cos²(πr/2w) for r < w, flat beyond. Its steepest slope is πd/2w, halfway
-/// down.
+/// A round dimple z = −d cos²(πr/2w) for r < w, flat outside. Its steepest slope is πd/2w, at half
+/// depth.
 ///
 /// ```
 /// use tactile_optics::surface::{Dimple, TopSurface};
@@ -119,7 +119,7 @@ impl TopSurface for Flat {
 /// let dimple = Dimple::new([15e-3_f64, 0.0], 4e-3, 1.5e-3)?;
 /// assert_eq!(dimple.height(15e-3, 0.0), -1.5e-3);
 /// assert_eq!(dimple.height(19.1e-3, 0.0), 0.0);
-/// // By its steepest slope s instead of its depth: d = 2ws/π.
+/// // Defined by its steepest slope s instead of its depth: d = 2ws/π.
 /// let depth_m = 0.3 * 4e-3 * std::f64::consts::FRAC_2_PI;
 /// assert!((Dimple::new([15e-3_f64, 0.0], 4e-3, depth_m)?.steepest() - 0.3).abs() < 1e-15);
 /// # Ok::<(), tactile_optics::OpticsError>(())
@@ -132,7 +132,7 @@ pub struct Dimple {
 }
 
 impl Dimple {
-    /// A dimple around `centre_m` (x, y) of half width w and depth d in metres.
+    /// Creates a dimple around `centre_m` (x, y) with half width w and depth d in metres.
     ///
     /// # Errors
     /// [`OpticsError::OutOfRange`] for a centre that is not finite, a half width that is not
@@ -225,11 +225,11 @@ pub struct Touched<S> {
 }
 
 impl<S: TopSurface> Touched<S> {
-    /// `surface` with `object` touching it within `radius_m` of `centre_m`.
+    /// Creates `surface` with `object` in contact within `radius_m` of `centre_m`.
     ///
     /// # Errors
     /// [`OpticsError::OutOfRange`] for an index that is not positive, an albedo outside 0 to 1, or
-    /// a circle without meaning.
+    /// an invalid circle.
     pub fn new(
         surface: S,
         object: TouchingObject,
@@ -272,7 +272,7 @@ impl<S: TopSurface> TopSurface for Touched<S> {
     fn support(&self) -> [f64; 2] {
         let [a, b] = self.surface.support();
         let (left, right) = (self.centre[0] - self.radius, self.centre[0] + self.radius);
-        // An empty support (a flat top) must not stretch to the contact.
+        // An empty support (a flat top) must not be extended to the contact.
         if a < b {
             [a.min(left), b.max(right)]
         } else {
@@ -292,9 +292,9 @@ impl<S: TopSurface> TopSurface for Touched<S> {
 /// The first intersection of a ray with the surface inside its support, at a distance along the ray
 /// between `from` and `to`.
 ///
-/// g = height − z is the gap above the ray. It closes no faster than u_z + L·√(u_x² + u_y²) with L
-/// the steepest slope, so a step of gap over that rate never jumps a crossing. Steps are taken
-/// until the gap is below `tolerance`.
+/// g = height − z is the gap above the ray. It closes at a rate of at most u_z + L·√(u_x² + u_y²)
+/// with the steepest slope L. A step of the gap divided by that rate therefore cannot miss a
+/// crossing. Steps continue until the gap is below `tolerance`.
 pub(crate) fn march<S: TopSurface + ?Sized>(
     surface: &S,
     position: &[f64; 3],
@@ -307,21 +307,21 @@ pub(crate) fn march<S: TopSurface + ?Sized>(
         let [x, y, z] = at(t);
         surface.height(x, y) - z
     };
-    // A ray that descends more steeply than any slope of the surface never meets it.
+    // A ray that descends more steeply than every slope of the surface never intersects it.
     let closing = direction[2] + surface.steepest() * direction[0].hypot(direction[1]);
     if closing <= 0.0 {
         return Meeting::Missed;
     }
     let (mut t, mut g) = (from, gap(from));
     if g <= tolerance {
-        // On the surface: it has just been left, or is met here unless the gap opens.
+        // On the surface: the ray has just left it, or intersects it here unless the gap increases.
         let [x, y, _] = at(t);
         let [gx, gy] = surface.gradient(x, y);
         let opening = gx * direction[0] + gy * direction[1] - direction[2];
         if opening <= 0.0 {
             return Meeting::At(t);
         }
-        // Twice the tolerance, so that the point just left is not found again.
+        // Twice the tolerance, so that the ray does not find its starting point again.
         t += (tolerance + tolerance) / opening;
         g = gap(t);
     }
@@ -338,21 +338,21 @@ pub(crate) fn march<S: TopSurface + ?Sized>(
     Meeting::Undecided
 }
 
-/// Steps after which a ray creeping along the surface is given up.
+/// Number of steps after which a ray along the surface is given up.
 const MAX_STEPS: usize = 20_000;
 
 /// Outcome of [`march`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Meeting {
-    /// The ray meets the surface here.
+    /// The ray intersects the surface at this distance.
     At(f64),
-    /// The ray does not meet the surface.
+    /// The ray does not intersect the surface.
     Missed,
-    /// The steps ran out while the ray creeps along the surface.
+    /// The number of steps was exceeded by a ray along the surface.
     Undecided,
 }
 
-/// Gap taken for contact: far below any length that matters, far above rounding.
+/// Gap that counts as contact: far below any relevant length, far above rounding.
 pub(crate) fn contact_gap(thickness: f64) -> f64 {
     thickness * f64::EPSILON.powf(0.6)
 }
@@ -361,13 +361,13 @@ pub(crate) fn contact_gap(thickness: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Step of the differences.
+    /// Step of the finite differences.
     const H: f64 = 1e-6;
 
-    /// Steps of a scan.
+    /// Number of steps of a scan.
     const STEPS: i32 = 20_000;
 
-    /// Of a crossing's place.
+    /// Tolerance of the position of a crossing.
     const TOLERANCE: f64 = 1e-9;
 
     #[test]
@@ -379,14 +379,14 @@ mod tests {
                 let [gx, gy] = dimple.gradient(x, y);
                 let dx = (dimple.height(x + H, y) - dimple.height(x - H, y)) / (2.0 * H);
                 let dy = (dimple.height(x, y + H) - dimple.height(x, y - H)) / (2.0 * H);
-                // Second differences of a curvature that jumps by 12 at the edge: H times that.
+                // Second differences of a curvature with a jump of 12 at the edge: H times 12.
                 assert!((gx - dx).abs() < 2e-5 && (gy - dy).abs() < 2e-5);
                 assert!(gx.hypot(gy) <= dimple.steepest() * (1.0 + 1e-15));
             }
         }
     }
 
-    /// The first crossing by scanning in small steps and bisecting.
+    /// The first crossing, found by small steps and bisection.
     fn scanned(surface: &Dimple, p: &[f64; 3], u: &[f64; 3], to: f64) -> Option<f64> {
         let gap = |t: f64| surface.height(p[0] + t * u[0], p[1] + t * u[1]) - (p[2] + t * u[2]);
         let first = (1..=STEPS).find(|&k| gap(to * f64::from(k) / f64::from(STEPS)) <= 0.0)?;
@@ -422,8 +422,8 @@ mod tests {
                 let found = march(&dimple, &p, &u, [0.0, 1.2], TOLERANCE);
                 match (found, scanned(&dimple, &p, &u, 1.2)) {
                     (Meeting::At(t), Some(expected)) => {
-                        // Stopping at a gap of the tolerance is early by it over the closing speed,
-                        // which is small where the ray grazes.
+                        // Stopping at a gap of the tolerance is early by the tolerance divided by
+                        // the closing speed, which is small for grazing rays.
                         assert!((t - expected).abs() < 1e-5, "{i} {j}: {t} {expected}");
                         met += 1;
                     }

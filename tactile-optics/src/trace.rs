@@ -1,19 +1,20 @@
-//! Ray tracing through the slab: the budget of an LED's light.
+//! Ray tracing through the slab: the budget of the LED light.
 //!
-//! Light enters through the edge x = 0 and travels along x between the top (deformed, possibly
-//! touched by an object) and the bottom, beyond which the camera looks up. At every interface its
-//! power is split by Fresnel's coefficients for unpolarised light and both parts are followed. What
-//! leaves the slab is counted. In the undeformed slab light within the acceptance angle is totally
-//! reflected for good. A press breaks this twice: the top's slope turns rays towards the normal, by
-//! twice the slope at each reflection, until they leave. A touching object lets light out of the
-//! top whatever its angle and scatters it back in all directions, some of them towards the camera.
+//! Light enters through the edge x = 0 and travels along x between the top (deformed, possibly in
+//! contact with an object) and the bottom, below which the camera is. At every interface its power
+//! is split by Fresnel's coefficients for unpolarised light, and both parts are followed. Light
+//! that leaves the slab is counted. In the undeformed slab, light within the acceptance angle is
+//! always totally reflected. A press changes this in two ways. The slope of the top rotates rays
+//! towards the normal, by twice the slope at each reflection, until they leave. A touching object
+//! lets light of any angle out of the top and scatters it back in all directions, partly towards
+//! the camera.
 //!
-//! Ray optics only: no interference, no polarisation kept from one interface to the next, no
-//! absorption in the layers.
+//! Only ray optics: no interference, no polarisation from one interface to the next, no absorption
+//! in the layers.
 //!
-//! Rays start on evenly spread points, so the budget converges much faster than with random ones
-//! (nearly as the inverse of the number of rays for a flat slab). Cost: O(rays × events), events
-//! being reflections until the light has left or falls below the cut-off.
+//! Rays start at evenly distributed points, so that the budget converges much faster than with
+//! random points (for a flat slab nearly as the inverse of the number of rays). Cost: O(rays ×
+//! events). Events are the reflections until the light has left or falls below the cut-off.
 
 use core::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI};
 
@@ -49,8 +50,8 @@ pub struct SlabLayer {
 /// ```
 /// use tactile_optics::trace::{Slab, SlabLayer};
 ///
-/// // Epidermis, dermis and subcutanea on a plate of glass: the paper's indices (§3.3) and
-/// // thicknesses.
+/// // Epidermis, dermis and subcutanea on a plate of glass, with the indices (§3.3) and
+/// // thicknesses of the paper.
 /// let layers = [(1.38, 2e-3), (1.39, 3e-3), (1.40, 5e-3), (1.41, 3e-3)]
 ///     .map(|(index, thickness_m)| SlabLayer { index, thickness_m });
 /// assert!(Slab::new(&layers, 1.0_f64, 30e-3).is_ok());
@@ -65,11 +66,11 @@ pub struct Slab<'a> {
 }
 
 impl<'a> Slab<'a> {
-    /// `layers` from the top down, in an `ambient` index, `length_m` from the lit edge to the far
-    /// one.
+    /// Creates a slab of `layers` from the top down in an ambient of index `ambient`, with
+    /// `length_m` from the lit edge to the far edge.
     ///
     /// # Errors
-    /// [`OpticsError::Empty`] without layers. [`OpticsError::OutOfRange`] for an index, thickness
+    /// [`OpticsError::Empty`] without layers; [`OpticsError::OutOfRange`] for an index, thickness
     /// or length that is not positive and finite.
     pub fn new(layers: &'a [SlabLayer], ambient: f64, length_m: f64) -> Result<Self, OpticsError> {
         if layers.is_empty() {
@@ -93,20 +94,20 @@ impl<'a> Slab<'a> {
         self.layers.iter().fold(0.0, |sum, l| sum + l.thickness_m)
     }
 
-    /// z of the upper face of layer `k` (of the bottom for `k` = number of layers).
+    /// z of the upper face of layer `k` (of the bottom if `k` is the number of layers).
     fn face(&self, k: usize) -> f64 {
         self.layers[..k].iter().fold(0.0, |z, l| z - l.thickness_m)
     }
 }
 
-/// Traces the LED's rays through the slab under `surface` and returns the light budget.
+/// Traces the rays of the LED through the slab under `surface` and returns the light budget.
 ///
-/// `camera_profile`, if not empty, receives the light reaching the camera by where along the slab
-/// it left, in equal bins from x = 0 to the length. It is overwritten, and its sum is
-/// [`LightBudget::camera`].
+/// `camera_profile`, if not empty, receives the light that reaches the camera, by the position at
+/// which it left the slab, in equal bins from x = 0 to the length. It is overwritten, and its sum
+/// is [`LightBudget::camera`].
 ///
 /// # Errors
-/// [`OpticsError::OutOfRange`] for a surface deeper than the top layer.
+/// [`OpticsError::OutOfRange`] for a surface that is deeper than the top layer.
 ///
 /// ```
 /// use tactile_optics::Led;
@@ -145,7 +146,7 @@ pub fn trace<S: TopSurface + ?Sized>(
     for i in 0..u64::from(options.rays) {
         let [z, u, v, y] = points.point(i);
         let (outside, weight) = led.direction(u, v, options.geometry);
-        // The sum of the weights is not known beforehand. It divides every share at the end.
+        // The sum of the weights is not known in advance. It divides every fraction at the end.
         total.add(RayOutcome::Entry, weight);
         let across = match options.geometry {
             Geometry::Section => 0.0,
@@ -154,8 +155,8 @@ pub fn trace<S: TopSurface + ?Sized>(
         let entry = launch(slab, z, across, outside);
         let transmitted = weight * entry.1;
         tracer.tally.add(RayOutcome::Entry, weight - transmitted);
-        // Random numbers of its own for each ray: what one ray scatters does not change the next
-        // ray's.
+        // Every ray has its own random numbers: light scattered from one ray does not affect the
+        // next ray.
         tracer.stream = hash(options.seed ^ hash(i));
         tracer.follow(Ray {
             power: transmitted,
@@ -167,7 +168,7 @@ pub fn trace<S: TopSurface + ?Sized>(
     Ok(tracer.tally.budget(total))
 }
 
-/// A tracer of an empty budget. Refuses a surface that reaches below the top layer.
+/// A tracer with an empty budget. It is an error if the surface extends below the top layer.
 fn new_tracer<'a, 's, S: TopSurface + ?Sized>(
     slab: &'a Slab<'s>,
     surface: &'a S,
@@ -193,8 +194,8 @@ fn new_tracer<'a, 's, S: TopSurface + ?Sized>(
     })
 }
 
-/// The ray inside the slab, at the share `z` of its thickness from the top, and the edge's
-/// transmittance.
+/// The ray inside the slab, at the fraction `z` of its thickness from the top, and the
+/// transmittance of the edge.
 fn launch(slab: &Slab<'_>, z: f64, y: f64, outside: [f64; 3]) -> (Ray, f64) {
     let mut depth = z * slab.thickness_m();
     let mut layer = 0;
@@ -205,7 +206,8 @@ fn launch(slab: &Slab<'_>, z: f64, y: f64, outside: [f64; 3]) -> (Ray, f64) {
     let n = slab.layers[layer].index;
     let across = outside[1].hypot(outside[2]);
     let edge = crossing(slab.ambient, n, across, outside[0].max(0.0));
-    // n sin θ is kept. A denser ambient can reflect all light at the edge: the power is then 0.
+    // n sin θ is conserved. A denser ambient can reflect all light at the edge: the power is then
+    // 0.
     let ratio = slab.ambient / n;
     let (uy, uz) = (outside[1] * ratio, outside[2] * ratio);
     let along = (1.0 - uy * uy - uz * uz).max(0.0).sqrt();
@@ -253,14 +255,13 @@ pub struct TraceOptions {
 }
 
 impl Default for TraceOptions {
-    /// 4096 rays in space, cut off at 10⁻⁶, a camera that sees 30° around its axis, an LED that is
-    /// a point.
+    /// 4096 rays in space, a cut-off of 10⁻⁶, a camera that sees 30° around its axis, and a point
+    /// LED.
     fn default() -> Self {
         Self {
             geometry: Geometry::Volume,
-            // The guided share to 2×10⁻⁴ in 20 ms:
-            // `cargo bench -p tactile-benches --bench work_precision -- optics` gives the error for
-            // more rays.
+            // The guided fraction is accurate to 2×10⁻⁴ in 20 ms. For the error with more rays run
+            // `cargo bench -p tactile-benches --bench work_precision -- optics`.
             rays: 4096,
             seed: 1,
             cutoff: 1e-6,
@@ -271,50 +272,52 @@ impl Default for TraceOptions {
 }
 
 impl TraceOptions {
-    /// Traces a section or all of space.
+    /// Sets whether a section or all of space is traced.
     pub fn with_geometry(mut self, geometry: Geometry) -> Self {
         self.geometry = geometry;
         self
     }
 
-    /// Shoots this number of rays from the LED.
+    /// Sets the number of rays from the LED.
     ///
     /// # Errors
-    /// [`OpticsError::OutOfRange`] for no rays.
+    /// [`OpticsError::OutOfRange`] for zero rays.
     pub fn with_rays(mut self, rays: u32) -> Result<Self, OpticsError> {
         within("number of rays", f64::from(rays), 1.0, 4.3e9)?;
         self.rays = rays;
         Ok(self)
     }
 
-    /// Shifts the starting points and draws other directions of scattered light.
+    /// Sets the seed, which shifts the starting points and changes the directions of scattered
+    /// light.
     pub fn with_seed(mut self, seed: u64) -> Self {
         self.seed = seed;
         self
     }
 
-    /// Gives up a branch that carries less than this share of its ray.
+    /// Sets the cut-off: a branch with less than this fraction of the power of its ray is not
+    /// followed.
     ///
     /// # Errors
-    /// [`OpticsError::OutOfRange`] outside 0 to 1.
+    /// [`OpticsError::OutOfRange`] for a fraction outside 0 to 1.
     pub fn with_cutoff(mut self, share: f64) -> Result<Self, OpticsError> {
         self.cutoff = within("cut-off", share, 0.0, 1.0)?;
         Ok(self)
     }
 
-    /// Counts rays that leave the bottom within this angle of its normal (radians) as seen by the
-    /// camera.
+    /// Sets the half angle of the camera (radians): rays that leave the bottom within this angle of
+    /// its normal reach the camera.
     ///
     /// # Errors
-    /// [`OpticsError::OutOfRange`] outside 0 to π/2.
+    /// [`OpticsError::OutOfRange`] for an angle outside 0 to π/2.
     pub fn with_camera_half_angle(mut self, angle: f64) -> Result<Self, OpticsError> {
-        // π/2 from degrees may lie above the right angle by rounding.
+        // π/2 converted from degrees may exceed a right angle by rounding.
         let right = FRAC_PI_2 * (1.0 + 1e-7);
         self.camera_half_angle = within("half angle of the camera", angle, 0.0, right)?;
         Ok(self)
     }
 
-    /// Spreads the LED over this half width across the slab, in metres. No effect in a section.
+    /// Sets the half width of the LED across the slab, in metres. It has no effect in a section.
     ///
     /// # Errors
     /// [`OpticsError::OutOfRange`] for a width that is negative or not finite.
@@ -324,7 +327,7 @@ impl TraceOptions {
     }
 }
 
-/// Shares of the LED's light by where it ended. They add up to 1 to rounding.
+/// Fractions of the LED light by where the light ended. They add up to 1 within rounding.
 ///
 /// ```
 /// use tactile_optics::Led;
@@ -336,32 +339,32 @@ impl TraceOptions {
 /// let leaked = budget.above + budget.below + budget.camera;
 /// let rest = budget.entry + budget.returned + budget.absorbed + budget.unresolved;
 /// assert!((budget.guided + leaked + rest - 1.0).abs() < 1e-12);
-/// // A flat layer keeps nearly all that enters it.
+/// // A flat layer guides nearly all light that enters it.
 /// assert!(budget.guided / (1.0 - budget.entry) > 0.98 && leaked < 0.02);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct LightBudget {
-    /// Reflected at the lit edge, never entering.
+    /// Reflected at the lit edge without entering.
     pub entry: f64,
     /// Guided to the far edge by total reflection.
     pub guided: f64,
-    /// Came back to the lit edge.
+    /// Returned to the lit edge.
     pub returned: f64,
     /// Left through the top into the ambient.
     pub above: f64,
-    /// Left through the bottom at an angle the camera does not see.
+    /// Left through the bottom at an angle outside the view of the camera.
     pub below: f64,
     /// Left through the bottom towards the camera.
     pub camera: f64,
     /// Lost in the touching object.
     pub absorbed: f64,
-    /// Not followed to its end: branches below the cut-off, rays with too many events.
+    /// Not followed to the end: branches below the cut-off and rays with too many events.
     pub unresolved: f64,
 }
 
-/// The outcome of a ray, in the order of [`LightBudget`]'s fields.
+/// Outcome of a ray, in the order of the fields of [`LightBudget`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(usize)]
 enum RayOutcome {
@@ -375,7 +378,7 @@ enum RayOutcome {
     Unresolved,
 }
 
-/// Compensated sums (Neumaier), one for each outcome: a million rays add up without loss.
+/// Compensated sums (Neumaier), one per outcome: a million rays are summed without loss.
 #[derive(Debug, Clone, Copy, Default)]
 struct Tally {
     sums: [f64; 8],
@@ -395,7 +398,7 @@ impl Tally {
         self.errors[k] += lost;
     }
 
-    /// Shares of `total`.
+    /// Fractions of `total`.
     fn budget(&self, total: f64) -> LightBudget {
         let share = |outcome: RayOutcome| {
             (self.sums[outcome as usize] + self.errors[outcome as usize]) / total
@@ -414,14 +417,15 @@ impl Tally {
 }
 
 /// Follows the stronger part of one ray and writes its vertices (x, y, z in metres, z from the
-/// undeformed top) to `vertices`. Returns how many were written. The ray enters the edge x = 0 in
-/// the plane y = 0 at `depth_share` of the slab's thickness, `angle` radians upwards from the LED's
-/// axis. It ends at an edge, where most of its light leaves through top or bottom, or where
+/// undeformed top) to `vertices`. Returns the number of vertices. The ray enters the edge x = 0 in
+/// the plane y = 0 at the fraction `depth_share` of the slab's thickness, at `angle` radians
+/// upwards from the axis of the LED. It ends at an edge, at the point at which most of its light
+/// leaves through top or bottom, or when `vertices` is full.
 /// `vertices` is full.
 ///
 /// # Errors
-/// [`OpticsError::OutOfRange`] for a share outside 0 to 1, an angle beyond a right one, or a
-/// surface deeper than the top layer.
+/// [`OpticsError::OutOfRange`] for a fraction outside 0 to 1, an angle beyond a right angle, or a
+/// surface that is deeper than the top layer.
 ///
 /// ```
 /// use tactile_optics::surface::Flat;
@@ -430,7 +434,7 @@ impl Tally {
 /// let slab = Slab::new(&[SlabLayer { index: 1.40_f64, thickness_m: 10e-3 }], 1.0, 30e-3)?;
 /// let mut vertices = [[0.0; 3]; 8];
 /// let count = path(&slab, &Flat, 0.5, 45.0_f64.to_radians(), &mut vertices)?;
-/// // In at the middle of the edge, reflected from side to side, out of the far edge.
+/// // Enters at the middle of the edge, is reflected from side to side, and leaves at the far edge.
 /// assert_eq!(vertices[0], [0.0, 0.0, -5e-3]);
 /// assert!((vertices[count - 1][0] - 30e-3).abs() < 1e-12);
 /// # Ok::<(), tactile_optics::OpticsError>(())
@@ -456,7 +460,7 @@ pub fn path<S: TopSurface + ?Sized>(
         vertices[written] = ray.position;
         written += 1;
         current = stronger_part(&mut tracer, ray);
-        // The path also has the point where its light leaves.
+        // The path also contains the point at which its light leaves.
         if current.is_none() && written < vertices.len() {
             let (distance, _) = tracer.next(&ray);
             vertices[written] = ray.at(distance);
@@ -466,8 +470,8 @@ pub fn path<S: TopSurface + ?Sized>(
     Ok(written)
 }
 
-/// The strongest of the parts into which the next obstacle splits a ray. `None` if more than half
-/// of its light leaves there.
+/// The strongest part into which the next obstacle splits a ray. `None` if more than half of its
+/// light leaves there.
 fn stronger_part<S: TopSurface + ?Sized>(tracer: &mut Tracer<'_, '_, S>, ray: Ray) -> Option<Ray> {
     let mut waiting = Branches::default();
     let mut best = tracer.advance(ray, &mut waiting);
@@ -479,7 +483,8 @@ fn stronger_part<S: TopSurface + ?Sized>(tracer: &mut Tracer<'_, '_, S>, ray: Ra
     best.filter(|b| b.power >= ray.power * 0.5)
 }
 
-/// Reflections after which a ray is given up: a guided ray in a long slab needs thousands at most.
+/// Number of reflections after which a ray is given up: a guided ray in a long slab needs a few
+/// thousand.
 const MAX_EVENTS: u32 = 20_000;
 
 /// The state of a trace: the scene, the sums and the random numbers.
@@ -499,22 +504,22 @@ struct Tracer<'a, 's, S: ?Sized> {
 /// The next obstacle on a ray's path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Next {
-    /// The slab's top.
+    /// The top of the slab.
     Top,
-    /// The upper face of its layer, an interface inside the slab.
+    /// The upper face of the layer, an interface inside the slab.
     Up,
-    /// The lower face of its layer.
+    /// The lower face of the layer.
     Down,
-    /// The edge it travels to.
+    /// The edge ahead of the ray.
     Edge,
-    /// None was found: the ray creeps along the surface.
+    /// No obstacle was found: the ray runs along the surface.
     Nothing,
 }
 
 impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
     /// Follows a ray and all its branches.
     fn follow(&mut self, first: Ray) {
-        // The cut-off is relative to each ray, so that weak rays are followed as deep as strong
+        // The cut-off is relative to each ray, so that weak rays are followed as far as strong
         // ones.
         let smallest = first.power * self.options.cutoff;
         let mut branches = Branches::default();
@@ -530,7 +535,7 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         }
     }
 
-    /// Moves the ray to its next obstacle. Returns the part that continues, if any.
+    /// Moves the ray to its next obstacle. Returns the part that continues, or `None`.
     fn advance(&mut self, ray: Ray, branches: &mut Branches) -> Option<Ray> {
         let (distance, next) = self.next(&ray);
         let mut ray = Ray {
@@ -550,8 +555,8 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
             }
             Next::Top => return self.top(ray, branches),
             Next::Up => {
-                // Put exactly on the face. Rounding could leave the ray outside the layer that it
-                // enters.
+                // Placed exactly on the face. Rounding could leave the ray outside the layer that
+                // it enters.
                 ray.position[2] = self.slab.face(ray.layer);
                 return self.inside(ray, ray.layer - 1, branches);
             }
@@ -567,10 +572,10 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         None
     }
 
-    /// Distance to and kind of the nearest obstacle: edge, face of the layer, or top.
+    /// Distance and kind of the nearest obstacle: edge, face of the layer, or top.
     fn next(&self, ray: &Ray) -> (f64, Next) {
         let [ux, _, uz] = ray.direction;
-        // The slab has no sides: across its width a ray travels on without an obstacle.
+        // The slab has no sides: a ray across its width meets no obstacle.
         let edge = match ux {
             u if u > 0.0 => (self.slab.length - ray.position[0]) / u,
             u if u < 0.0 => ray.position[0] / -u,
@@ -590,8 +595,8 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         } else if uz > 0.0 && ray.layer > 0 {
             offer((self.slab.face(ray.layer) - ray.position[2]) / uz, Next::Up);
         }
-        // Only the top layer meets the deformed surface, which `new_tracer` keeps above its lower
-        // face.
+        // Only the top layer is bounded by the deformed surface, which `new_tracer` keeps above the
+        // lower face of that layer.
         if ray.layer > 0 {
             return nearest;
         }
@@ -602,8 +607,8 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         }
     }
 
-    /// Where the ray meets the top before the distance `limit`: the plane z = 0 outside the
-    /// surface's support, the surface itself inside.
+    /// Intersection of the ray with the top before the distance `limit`: with the plane z = 0
+    /// outside the support of the surface, and with the surface itself inside.
     fn meet_top(&self, ray: &Ray, limit: f64) -> Meeting {
         let ([x, _, z], [ux, _, uz]) = (ray.position, ray.direction);
         let [left, right] = self.surface.support();
@@ -630,8 +635,8 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
                 Meeting::Missed
             }
         };
-        // The flat top decides where the support is empty, lies behind the ray, or begins beyond
-        // the crossing of z = 0.
+        // The flat top applies if the support is empty, lies behind the ray, or begins beyond the
+        // crossing of z = 0.
         if left >= right || leave <= 0.0 || plane < enter {
             return meets_plane(plane);
         }
@@ -645,7 +650,8 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
             [enter, leave.min(limit)],
             self.tolerance,
         ) {
-            // Past the support the top is the plane z = 0 again, which counts from there on only.
+            // Beyond the support the top is the plane z = 0 again, which applies only from there
+            // on.
             Meeting::Missed => meets_plane(plane.max(leave)),
             met => met,
         }
@@ -657,7 +663,7 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         let [x, y, _] = ray.position;
         let [left, right] = self.surface.support();
         let deformed = x > left && x < right;
-        // Slopes and object count inside the support only, as in `meet_top`.
+        // Slopes and object apply only inside the support, as in `meet_top`.
         let [gx, gy] = if deformed {
             self.surface.gradient(x, y)
         } else {
@@ -675,7 +681,7 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
             None
         };
         let outside = object.map_or(self.slab.ambient, |o| o.index);
-        // Against an object that touches, its own index decides, which may end total reflection.
+        // At a touching object its index applies, so that reflection need not be total.
         let transmitted = ray.power * self.transmittance(&ray, &normal, outside);
         match object {
             None => self.tally.add(RayOutcome::Above, transmitted),
@@ -697,12 +703,13 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         Some(ray.mirrored(&normal, ray.power - transmitted))
     }
 
-    /// Splits a ray at the bottom: the transmitted part leaves, towards the camera or past it.
+    /// Splits a ray at the bottom: the transmitted part leaves, towards the camera or not.
     fn bottom(&mut self, ray: Ray) -> Ray {
         let normal = [0.0, 0.0, 1.0];
         let transmitted = ray.power * self.transmittance(&ray, &normal, self.slab.ambient);
         let sine = ray.direction[0].hypot(ray.direction[1]);
-        // The camera's angle holds outside the slab. Snell's law brings it to the ray's own layer.
+        // The camera's angle is defined outside the slab. Snell's law converts it to the layer of
+        // the ray.
         let seen = self.slab.layers[ray.layer].index * sine <= self.slab.ambient * self.camera_sine;
         self.tally.add(
             if seen {
@@ -721,8 +728,8 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         ray.mirrored(&normal, ray.power - transmitted)
     }
 
-    /// Splits a ray at an interface inside the slab: the refracted part continues, the reflected
-    /// part waits as a branch.
+    /// Splits a ray at an interface inside the slab: the refracted part continues, and the
+    /// reflected part is stored as a branch.
     fn inside(&mut self, ray: Ray, beyond: usize, branches: &mut Branches) -> Option<Ray> {
         let normal = [0.0, 0.0, 1.0];
         let (n1, n2) = (
@@ -731,15 +738,15 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         );
         let [ux, uy, uz] = ray.direction;
         let (sine, cosine) = (ux.hypot(uy), uz.abs());
-        // Total reflection needs no branch, since nothing is transmitted.
+        // Total reflection needs no branch, because no light is transmitted.
         let Some((share, along)) = crossing(n1, n2, sine, cosine) else {
             return Some(ray.mirrored(&normal, ray.power));
         };
         let transmitted = ray.power * share;
         self.keep(ray.mirrored(&normal, ray.power - transmitted), branches);
         let ratio = n1 / n2;
-        // Snell's law keeps n times the tangential part. The normal part comes from `crossing`,
-        // free of cancellation at grazing.
+        // By Snell's law n times the tangential part is conserved. The normal part comes from
+        // `crossing`, without cancellation at grazing incidence.
         let direction = normalised([ux * ratio, uy * ratio, (along / n2).copysign(uz)]);
         Some(Ray {
             direction,
@@ -756,19 +763,20 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         crossing(inside, outside, sine, cosine).map_or(0.0, |(share, _)| share)
     }
 
-    /// Stores a branch for later, or counts it as unresolved when the stack is full.
+    /// Stores a branch for later, or counts it as unresolved if the stack is full.
     fn keep(&mut self, ray: Ray, branches: &mut Branches) {
         if ray.power > 0.0 && !branches.push(ray) {
             self.tally.add(RayOutcome::Unresolved, ray.power);
         }
     }
 
-    /// A direction into the slab by Lambert's law about the surface's inward normal.
+    /// A direction into the slab by Lambert's law about the inward normal of the surface.
     fn scatter(&mut self, normal: &[f64; 3]) -> [f64; 3] {
         self.stream = hash(self.stream);
         let u = unit(self.stream);
         if self.options.geometry == Geometry::Section {
-            // In a plane Lambert's law spreads the sine of the angle evenly over −1 to 1.
+            // In a plane, Lambert's law is a uniform distribution of the sine of the angle over −1
+            // to 1.
             let across = u + u - 1.0;
             let inward = ((1.0 - across) * (1.0 + across)).sqrt();
             return normalised([
@@ -779,11 +787,11 @@ impl<S: TopSurface + ?Sized> Tracer<'_, '_, S> {
         }
         self.stream = hash(self.stream);
         let (sin, cos) = (unit(self.stream) * (PI + PI)).sin_cos();
-        // Even points of a disc, raised to the hemisphere, obey Lambert's law in space (Malley's
-        // method).
+        // Uniform points of a disc, projected to the hemisphere, follow Lambert's law in space
+        // (Malley's method).
         let (radius, inward) = (u.sqrt(), (1.0 - u).sqrt());
-        // Two directions in the tangent plane. The normal is never along y, its z part being
-        // positive, so that `first` has a length.
+        // Two directions in the tangent plane. The z component of the normal is positive, so that
+        // the normal is never along y and `first` is not zero.
         let first = normalised([normal[2], 0.0, -normal[0]]);
         let second = [
             normal[1] * first[2] - normal[2] * first[1],
@@ -812,12 +820,12 @@ impl Ray {
         core::array::from_fn(|k| self.position[k] + t * self.direction[k])
     }
 
-    /// The ray mirrored at a plane with unit normal `n`, `power` left.
+    /// The ray mirrored at a plane with the unit normal `n`, with the remaining `power`.
     fn mirrored(&self, n: &[f64; 3], power: f64) -> Self {
         let along = dot(&self.direction, n);
         let direction = core::array::from_fn(|k| self.direction[k] - (along + along) * n[k]);
         Self {
-            // Rounding would otherwise grow over thousands of reflections.
+            // Without this, rounding errors would grow over thousands of reflections.
             direction: normalised(direction),
             power,
             ..*self
@@ -834,7 +842,7 @@ fn normalised(v: [f64; 3]) -> [f64; 3] {
     v.map(|c| c / length)
 }
 
-/// Sine of the angle between unit vectors, accurate when small.
+/// Sine of the angle between unit vectors, accurate for small angles.
 fn sine_between(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     let x = a[1] * b[2] - a[2] * b[1];
     let y = a[2] * b[0] - a[0] * b[2];
@@ -842,7 +850,7 @@ fn sine_between(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     (x * x + y * y + z * z).sqrt().min(1.0)
 }
 
-/// Branches waiting to be followed. A fixed size, so that tracing never allocates.
+/// Branches that are still to be followed. The size is fixed, so that tracing never allocates.
 #[derive(Debug, Default)]
 struct Branches {
     rays: [Option<Ray>; 32],
@@ -850,7 +858,7 @@ struct Branches {
 }
 
 impl Branches {
-    /// Stores a ray. False when the stack is full.
+    /// Stores a ray. Returns false if the stack is full.
     fn push(&mut self, ray: Ray) -> bool {
         let Some(slot) = self.rays.get_mut(self.count) else {
             return false;
