@@ -1,5 +1,5 @@
-//! Strain of many gradients, contacts on layers: time, with the error printed beside it.
-//! The bench `work_precision` has the laws of a ball.
+//! Strain of many gradients and contacts on layers: times and errors. For the laws of a ball see
+//! the bench `work_precision`.
 #![allow(clippy::print_stdout, missing_docs)]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -13,7 +13,7 @@ use tactile_imaging::elasticity::strain::{
 
 const GRADIENTS: usize = 100_000;
 
-/// Gradients of up to 20 % under a small turn.
+/// Gradients of up to 20 % with a small rotation.
 fn gradients() -> Vec<Matrix3<f64>> {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     (0..GRADIENTS)
@@ -31,7 +31,7 @@ fn strain(c: &mut Criterion) {
     let gradients = gradients();
     let strain = |h| GreenLagrange.strain(h).unwrap();
     let mut strains: Vec<_> = gradients.iter().map(strain).collect();
-    // The slow obvious form, E = (FᵀF − I)/2.
+    // The direct but slow form, E = (FᵀF − I)/2.
     let error = (gradients.iter().zip(&strains))
         .map(|(h, e)| {
             let f = h + Matrix3::identity();

@@ -1,4 +1,4 @@
-//! Frames of gels lit in colours: face and contacts, and markers followed.
+//! Frames of gels under coloured light: calibration, contacts and tracked markers.
 #![allow(missing_docs)]
 
 use std::hint::black_box;
@@ -9,7 +9,7 @@ use ndarray::{Array2, Array3};
 use tactile_gel::simulate::{ColourGel, ElasticFace, HertzPress};
 use tactile_gel::{BallPress, GelSensor, Marker, MarkerField};
 
-/// A calibration of twenty presses: their frames, and that without contact.
+/// A calibration of twenty presses: their frames and the frame without contact.
 fn presses(shape: [usize; 2]) -> (Array3<u8>, Vec<Array3<u8>>) {
     let gel = ColourGel {
         shape,

@@ -1,10 +1,10 @@
-//! Problems that several benches have in common: points to be matched, and maps of space.
+//! Problems used by several benches: points to be matched, and maps of space.
 
 use nalgebra::{Point, Point3, SVector, Vector3};
 use rand::{RngExt, SeedableRng, rngs::SmallRng};
 use tactile_imaging::tps::{Kernel, ThinPlateSpline};
 
-/// A model, a target, and where each model point truly goes.
+/// A model, a target, and the true image of each model point.
 pub struct Scene<const D: usize> {
     /// The points to be matched.
     pub model: Vec<Point<f64, D>>,
@@ -15,8 +15,8 @@ pub struct Scene<const D: usize> {
 }
 
 impl<const D: usize> Scene<D> {
-    /// `n` points of a jittered sunflower disc of radius 1 (a bell in space), warped by six broad
-    /// Gaussians.
+    /// `n` points of a jittered sunflower disc of radius 1 (bell-shaped in space), warped by six
+    /// broad Gaussians.
     pub fn new(seed: u64, n: usize, jitter: f64, outliers: usize, noise: f64) -> Self {
         let mut random = SmallRng::seed_from_u64(seed);
         let mut uniform = |size: f64| random.random_range(-size..size);
@@ -55,7 +55,8 @@ impl<const D: usize> Scene<D> {
     }
 }
 
-/// Uniform points of the cube [−1, 1]³ moved by five Gaussian bumps, and where others go.
+/// Uniform points of the cube [−1, 1]³ displaced by five Gaussian bumps, and other points with
+/// their true images.
 pub struct Problem {
     /// Points with a known image.
     pub sources: Vec<Point3<f64>>,
@@ -63,12 +64,13 @@ pub struct Problem {
     pub targets: Vec<Point3<f64>>,
     /// Other points.
     pub queries: Vec<Point3<f64>>,
-    /// The images of these.
+    /// The true images of the other points.
     pub truth: Vec<Point3<f64>>,
 }
 
 impl Problem {
-    /// `n` sources and `queries` other points. Targets are off by up to `noise` along each axis.
+    /// `n` sources and `queries` other points. The noise of targets is at most `noise` along each
+    /// axis.
     pub fn new(seed: u64, n: usize, noise: f64, queries: usize) -> Self {
         let mut random = SmallRng::seed_from_u64(seed);
         let mut point =
@@ -104,7 +106,7 @@ impl Problem {
         self.error_of(&values)
     }
 
-    /// Root mean square distance of values at the queries from the truth.
+    /// Root mean square distance of values at the queries from the true values.
     pub fn error_of(&self, values: &[Point3<f64>]) -> f64 {
         let both = values.iter().zip(&self.truth);
         let squares = both.map(|(v, t)| (v - t).norm_squared());

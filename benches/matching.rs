@@ -1,8 +1,8 @@
-//! Point matching: time beside error, on generated scenes with known partners.
+//! Point matching: times and errors on generated scenes with known partners.
 //!
-//! `match/105x105` and `match/200x200` are jittered discs bent into a bell under a smooth warp
-//! (clean, with outliers, with noise), `match/scaling` the plane's disc from 105 points up. Every
-//! answer is checked before it is timed.
+//! `match/105x105` and `match/200x200` are jittered discs in the shape of a bell under a smooth
+//! warp (clean, with outliers, with noise). `match/scaling` uses plane discs from 105 points up.
+//! Every result is checked before it is timed.
 #![allow(clippy::print_stdout, missing_docs)]
 
 use std::hint::black_box;
@@ -14,14 +14,14 @@ use tactile_imaging::matching::{
     AnnealedSoftassign, PointMatcher, RelaxationLabelling, SoftassignWorkspace,
 };
 
-/// A scene of so many points with jitter in proportion to their distance.
+/// A scene with this number of points and jitter proportional to their distance.
 fn scene<const D: usize>(n: usize, outliers: usize, noise: f64) -> Scene<D> {
     let seed = (n + 7 * outliers) as u64;
     Scene::new(seed, n, 0.25 / (n as f64).sqrt(), outliers, noise)
 }
 
-/// Checks and times the default matcher on one scene; a match through a warm workspace, without the
-/// spline of the result.
+/// Checks and times the default matcher on one scene. The timing is that of a match with a warm
+/// workspace, without the spline of the result.
 fn fast<const D: usize>(
     criterion: &mut Criterion,
     group: &str,
@@ -59,8 +59,8 @@ fn fast<const D: usize>(
 fn sizes(criterion: &mut Criterion) {
     for n in [105, 200] {
         let group = format!("match/{n}x{n}");
-        // Clean scenes are solved to rounding; noise of ±0.05 (sd 0.029 an axis) leaves less than
-        // half of it.
+        // Clean scenes are solved to rounding. Noise of ±0.05 (sd 0.029 per axis) causes an error
+        // of less than half of it.
         for (name, outliers, noise, bound) in [
             ("clean", 0, 0.0, 1e-9),
             ("outliers", n / 5, 0.0, 1e-9),
@@ -72,7 +72,7 @@ fn sizes(criterion: &mut Criterion) {
     }
 }
 
-/// The paper's relaxation labelling on the same 105 points.
+/// The relaxation labelling of the paper on the same 105 points.
 fn labelling(criterion: &mut Criterion) {
     let scene = scene::<3>(105, 0, 0.0);
     let matcher = RelaxationLabelling::default();
@@ -83,14 +83,14 @@ fn labelling(criterion: &mut Criterion) {
         b.iter(matched);
         let error = scene.error(&matched().warped);
         println!("match/105x105/labelling: mean error {error:.2e}");
-        // It measured 1.6e-3 of the disc's radius on this scene; three times that would be another
-        // answer.
+        // The measured error on this scene is 1.6e-3 of the radius of the disc. Three times that
+        // would be a different result.
         assert!(error < 5e-3, "labelling: error {error}");
     });
     group.finish();
 }
 
-/// The plane's disc, 105 points to sixteen times as many, all of them matched right.
+/// Plane discs with 105 points to sixteen times as many, all of which are matched correctly.
 fn scaling(criterion: &mut Criterion) {
     for n in [105, 210, 420, 840, 1680] {
         let scene = scene::<2>(n, 0, 0.0);

@@ -1,4 +1,4 @@
-//! Surfaces: a contact's share of the frame, control points and depth tables.
+//! Surfaces: dependence on the fraction of the frame, control points and depth tables.
 //!
 //! The bench `work_precision` compares the methods of shape from shading and of slope integration.
 
@@ -11,12 +11,12 @@ use tactile_imaging::sfs::{
     Lighting, Surface, SurfaceReconstruction, SurfaceWorkspace,
 };
 
-/// A contact of a given share of the frame against one that fills it.
+/// A contact that covers a fraction of the frame compared with one that fills it.
 fn contact_share(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("sfs/share");
     let (rows, columns) = (1042, 1392);
     for percent in [5, 100] {
-        // The same bump, scaled; its box has the share of the frame's area.
+        // The same bump, scaled: its box covers this fraction of the frame's area.
         let share = (percent as f64 / 100.0).sqrt();
         let [a, b] = [share * 0.5 * columns as f64, share * 0.5 * rows as f64];
         let coordinates = |r: usize, c: usize| ((c as f64 - 695.5) / a, (r as f64 - 520.5) / b);
@@ -32,7 +32,7 @@ fn contact_share(criterion: &mut Criterion) {
             (255.0 / (1.0 + p * p + q * q).sqrt()) as u8
         });
         let lighting = Lighting::default().with_normal_intensity(255.0).unwrap();
-        // The peak is known, for where the frame is full no rim is in sight.
+        // The peak is known, because the rim is not visible in a full frame.
         let mut known = Array2::from_elem((rows, columns), f64::NAN);
         known[[520, 695]] = height;
         let domain = Domain::default()

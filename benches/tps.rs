@@ -1,8 +1,8 @@
-//! Thin-plate splines: fit, refit, evaluate, differentiate; the error stands beside the time.
+//! Thin-plate splines: times of fit, refit, evaluation and differentiation, with errors.
 //!
-//! The problem is that of common RBF packages' own comparisons: `n` uniform points in the cube [−1,
-//! 1]³ moved by five Gaussian bumps, 10,000 queries. Every answer is checked against the map before
-//! it is timed.
+//! The problem is that of common benchmarks of RBF packages: `n` uniform points in the cube [−1,
+//! 1]³ displaced by five Gaussian bumps, and 10,000 queries. Every result is compared with the map
+//! before it is timed.
 #![allow(clippy::print_stdout, missing_docs)]
 
 use std::hint::black_box;
@@ -22,7 +22,7 @@ fn problem(n: usize) -> Problem {
     Problem::new(n as u64, n, 0.0, QUERIES)
 }
 
-/// Fits once, prints the error beside what the fit reports, and checks it.
+/// Fits once, prints and checks the error, and prints the report of the fit.
 fn solved<K: Kernel + Default>(
     problem: &Problem,
     options: &FitOptions<K>,
@@ -53,7 +53,7 @@ fn fit<K: Kernel + Default>(c: &mut Criterion, problem: &Problem, name: &str, ke
     });
 }
 
-/// New targets on the factors that are kept.
+/// New targets with the stored factors.
 fn refit<K: Kernel + Default>(c: &mut Criterion, problem: &Problem, name: &str, kernel: K) {
     let n = problem.sources.len();
     let factorization =
@@ -95,7 +95,7 @@ fn kernel<K: Kernel + Default>(c: &mut Criterion, name: &str, kernel: K) {
     }
 }
 
-/// A fit of ten thousand points takes seconds: not for a quick look.
+/// A fit of ten thousand points takes seconds and is omitted in a quick run.
 fn many(c: &mut Criterion) {
     if std::env::args().any(|argument| argument == "--test" || argument == "--quick") {
         return;

@@ -1,5 +1,5 @@
-//! Contacts by finite elements, as CSV: those that the simulator's finite-element scene draws from,
-//! or those of a test.
+//! Contacts by finite elements, as CSV: the contacts of the simulator's finite-element scene, or
+//! those of a test.
 //!
 //! ```console
 //! cargo run --release --example contact_states > tactile-simulate/src/finite_elements.csv
@@ -7,8 +7,8 @@
 //! ```
 //!
 //! Neo-Hookean balls on neo-Hookean layers or on a rigid flat, without friction. ν = ½ is computed
-//! as 0.4999. A row a point: its contact (modulus, radius, layers as thickness:modulus, force,
-//! contact radius, approach), then distance from the axis, pressure and height.
+//! as 0.4999. Each row is one point: its contact (modulus, radius, layers as thickness:modulus,
+//! force, contact radius, approach), then distance from the axis, pressure and height.
 use std::io::{Result, Write, stdout};
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::fem::{
@@ -21,7 +21,7 @@ const POISSON_RATIO: f64 = 0.4999;
 struct Ball {
     youngs_modulus_pa: f64,
     radius_m: f64,
-    /// Thickness and modulus of each layer; none on a rigid flat.
+    /// Thickness and modulus of each layer. Empty for a rigid flat.
     layers: Vec<(f64, f64)>,
     forces_n: Vec<f64>,
 }
@@ -42,7 +42,7 @@ impl Ball {
                     material: material(modulus)?,
                 });
             }
-            // Wide enough that its rim is not felt.
+            // Wide enough for the rim to have no effect.
             let guide = Guide::new(layers, (5.0 * self.radius_m).max(2.8 * thickness_m))?;
             press = press.on_guide(guide)?;
         }
@@ -63,8 +63,8 @@ impl Ball {
                 continue;
             };
             let a = contact.radius_m;
-            // Heights count from the guide's undeformed surface, which the glass has carried up by
-            // the approach.
+            // Heights are counted from the undeformed surface of the guide, which the glass has
+            // lifted by the approach.
             let mut rows: Vec<[f64; 3]> = (state.pressure().iter())
                 .map(|p| [p.r_m, p.pressure_pa, p.z_m - state.approach_m()])
                 .collect();
@@ -106,7 +106,7 @@ fn papers_layers() -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// The paper's two polymers on its waveguide.
+/// The two polymers of the paper on its waveguide.
 fn polymers() -> Vec<Ball> {
     [Elastic::CL2000X, Elastic::CL2003X]
         .map(|polymer| Ball {
@@ -118,7 +118,7 @@ fn polymers() -> Vec<Ball> {
         .into()
 }
 
-/// Moduli, radii, guides and loads that no table holds and no law was fitted to.
+/// Moduli, radii, guides and loads that are in no table and were not used for the fit of a law.
 fn presses() -> Vec<Ball> {
     let on = |layers: &[(f64, f64)], modulus, radius_m, forces_n: &[f64]| Ball {
         youngs_modulus_pa: modulus,

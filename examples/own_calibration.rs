@@ -1,4 +1,4 @@
-//! A calibration of one's own: light that saturates, F = c V/(V₀ − V), in the force of a frame.
+//! A user-defined calibration: light that saturates, F = c V/(V₀ − V), and the force of a frame.
 #![allow(clippy::print_stdout)]
 use ndarray::Array2;
 use tactile_force::{ForceError, StressCalibration, measure_force};

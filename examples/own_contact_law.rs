@@ -1,5 +1,5 @@
-//! A contact law of one's own inside an estimator inside the pipeline: the pipeline measures force
-//! and contact and states the guide, the law turns them into a modulus with an error.
+//! A user-defined contact law in an estimator of the pipeline. The pipeline measures force and
+//! contact and provides the guide; the law converts them to a modulus with an error.
 #![allow(clippy::print_stdout)]
 use std::error::Error;
 use tactile_imaging::elasticity::laws::{ContactLaw, ContactLength, Limits, LogForce, Reach};

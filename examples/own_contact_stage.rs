@@ -1,11 +1,11 @@
-//! A contact stage written from nothing, in the pipeline.
+//! A user-defined contact stage in the pipeline.
 #![allow(clippy::print_stdout)]
 use ndarray::ArrayView2;
 use std::error::Error;
 use tactile_imaging::prelude::*;
 use tactile_simulate::{CalibrationRun, PressOptions, Trial};
 
-/// All pixels brighter than the reference by a threshold; their light is force.
+/// All pixels that exceed the reference by a threshold. Their light is the force.
 struct Bright {
     threshold: u8,
     newton_per_grey: f64,

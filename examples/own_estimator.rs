@@ -1,6 +1,6 @@
-//! An estimator of one's own as a stage of the pipeline: the weighted mean of Hertz's modulus over
-//! all loads, with the errors of forces and radii, of the calibration, of the pixel and of the guide
-//! carried along.
+//! A user-defined estimator as a stage of the pipeline: the weighted mean of Hertz's modulus over
+//! all loads. The errors of forces and radii, of the calibration, of the pixel size and of the
+//! guide are propagated.
 #![allow(clippy::print_stdout)]
 use std::error::Error;
 use tactile_imaging::elasticity::ElasticityError;
@@ -9,7 +9,7 @@ use tactile_imaging::elasticity::modulus::{
 };
 use tactile_simulate::{CalibrationRun, PressOptions, Trial};
 
-/// E* = ¾ F R/a³ of a ball, and of it E by 1/E* = (1 − ν²)/E + C with the guide's compliance C.
+/// E* = ¾ F R/a³ of a ball, and E from 1/E* = (1 − ν²)/E + C with the compliance C of the guide.
 struct MeanOfHertz;
 
 impl ModulusEstimator for MeanOfHertz {
@@ -31,7 +31,7 @@ impl ModulusEstimator for MeanOfHertz {
         }
         let radius_m = bodies.size() * radius_m;
         let reduced = (sum * f64::recip(weights)).map(f64::exp, f64::exp) * radius_m;
-        // Every source of error goes its own way from here to the modulus.
+        // Each source of error is propagated separately from here to the modulus.
         let mean_m = Uncertain::mean(&radii).value;
         let compliance = bodies.guide_compliance(mean_m) * bodies.in_series().compliance_per_pa();
         let lateral = bodies

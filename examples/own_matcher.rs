@@ -1,4 +1,4 @@
-//! A matcher written from nothing, in the pipeline.
+//! A user-defined matcher in the pipeline.
 #![allow(clippy::print_stdout)]
 use nalgebra::Point3;
 use std::error::Error;
@@ -6,7 +6,7 @@ use tactile_imaging::matching::{MatchError, Matching, PointMatcher};
 
 use tactile_simulate::{CalibrationRun, PressOptions, Trial};
 
-/// Mutual nearest neighbours of both sets as they lie.
+/// Mutual nearest neighbours of the two sets at their given positions.
 struct MutualNearest;
 
 impl PointMatcher<3> for MutualNearest {

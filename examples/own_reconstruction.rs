@@ -1,10 +1,10 @@
-//! A reconstruction of one's own behind the trait: darkening is depth, by Beer's law, without any
-//! method of the library.
+//! A user-defined reconstruction: the darkening gives the depth by Beer's law, without any method
+//! of the library.
 #![allow(clippy::print_stdout)]
 use ndarray::{Array2, array};
 use tactile_imaging::sfs::{Domain, Image, SfsError, Surface, SurfaceReconstruction};
 
-/// Light that fades as exp(−z/length) with the depth z in metres.
+/// Light that decays as exp(−z/length) with the depth z in metres.
 struct Absorption {
     length_m: f64,
 }

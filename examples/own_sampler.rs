@@ -1,5 +1,4 @@
-//! A sampler of control points of one's own behind the trait, and the pipeline that takes it: the
-//! highest pixels.
+//! A user-defined sampler of control points, which selects the highest pixels, in the pipeline.
 #![allow(clippy::print_stdout)]
 use ndarray::{Array2, ArrayView2};
 use tactile_imaging::sfs::nalgebra::Point3;
@@ -45,7 +44,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         points.len()
     );
     assert!(points.len() == 50 && lowest > 19.0);
-    // The same one line puts it into the pipeline: `pipeline.with_sampler(Highest)`.
+    // In a pipeline: `pipeline.with_sampler(Highest)`.
     assert!(
         Highest
             .sample(heights.view(), &Domain::default(), 2000)

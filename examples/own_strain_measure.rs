@@ -1,11 +1,11 @@
-//! A measure of strain written from nothing, in the pipeline.
+//! A user-defined strain measure in the pipeline.
 #![allow(clippy::print_stdout)]
 use nalgebra::Matrix3;
 use std::error::Error;
 use tactile_imaging::prelude::*;
 use tactile_simulate::{CalibrationRun, PressOptions, Trial};
 
-/// Swainger's strain I − V⁻¹ by its square, I − B^(−½): V² = B = F Fᵀ.
+/// Swainger's strain I − V⁻¹, computed as I − B^(−½): V² = B = F Fᵀ.
 struct Swainger;
 
 impl StrainMeasure for Swainger {

@@ -1,9 +1,9 @@
-//! A warp of one's own behind the trait, and the pipeline that takes it: growth about the centroid.
+//! A user-defined warp for the pipeline: growth about the centroid.
 #![allow(clippy::print_stdout)]
 use tactile_imaging::tps::nalgebra::{Matrix3, Point3, Vector3};
 use tactile_imaging::tps::{TpsError, Warp, WarpModel};
 
-/// f(x) = c' + s (x − c): what a sphere does that swells.
+/// f(x) = c' + s (x − c): the map of a sphere that swells.
 struct Growth {
     from: Vector3<f64>,
     to: Vector3<f64>,
@@ -57,7 +57,7 @@ fn main() -> Result<(), TpsError> {
     let stretch = warp.jacobian(&sources[0])[(0, 0)];
     println!("the points grow by a factor of {stretch:.3}, 1.1 in truth");
     assert!((stretch - 1.1).abs() < 1e-12);
-    // The same one line puts it into the pipeline: `pipeline.with_warp(GrowthModel)`.
+    // In a pipeline: `pipeline.with_warp(GrowthModel)`.
     assert!(GrowthModel.fit(&sources[..1], &targets[..1], None).is_err());
     Ok(())
 }

@@ -1,13 +1,13 @@
-//! The paper's two samples, balls of 3 mm radius of 103 and 62 kPa at 0.7 and 1.2 N, by every
-//! estimator: a table beside the truth.
+//! The two samples of the paper (balls of 3 mm radius with 103 and 62 kPa at 0.7 and 1.2 N) with
+//! every estimator: a table of results and true values.
 //!
 //! ```console
 //! cargo run --release -- table examples/data/contact_table/scene.toml --out target/table   # some minutes, for the last row
 //! cargo run --release --example paper_samples -- target/paper_samples target/table/table.toml
 //! ```
-//! It simulates the presses by finite elements, writes each as a scene file with its frames, and
-//! measures those files. Without a table that row is left out; without a folder it writes to
-//! `target/paper_samples`.
+//! The presses are simulated by finite elements, written as scene files with their frames, and
+//! measured from these files. Without a contact table its row is omitted. Without a folder the
+//! files are written to `target/paper_samples`.
 #![allow(clippy::print_stdout)]
 use std::error::Error;
 use std::fmt::Write;
@@ -82,7 +82,7 @@ fn write_sample(folder: &Path, material: Elastic) -> Result<Scene, Box<dyn Error
     Ok(Scene::read(path)?)
 }
 
-/// A modulus in kPa with its 95 % interval in words, or why there is none.
+/// A modulus in kPa with its 95 % interval as text, or the reason why there is none.
 type Modulus = Result<(f64, String), String>;
 
 fn moduli(

@@ -1,4 +1,4 @@
-//! Before a block of tissue is pressed: how well would a lump's size, depth and stiffness be known?
+//! Planning a press of tissue: the accuracy of size, depth and stiffness of a lump.
 #![allow(clippy::print_stdout)]
 use std::error::Error;
 use tactile_imaging::fem::{Guide, GuideLayer, Interface, Material};
@@ -20,7 +20,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         youngs_modulus_pa: 40e3,
         block_modulus_pa: 5e3,
     };
-    // Rings of a picture whose pixels have 30 Pa of white noise and a tenth of a millimetre.
+    // Rings of a pressure image with 30 Pa of white noise per pixel and pixels of a tenth of a
+    // millimetre.
     let radii_m: Vec<f64> = (0..20).map(|k| (f64::from(k) + 0.5) * 0.6e-3).collect();
     let pixels = |radius_m: f64| core::f64::consts::TAU * radius_m * 0.6e-3 / 1e-8;
     let noise_pa: Vec<f64> = radii_m.iter().map(|&r| 30.0 / pixels(r).sqrt()).collect();

@@ -1,5 +1,4 @@
-//! Writes a simulated press as a folder that `tactile measure` reads: frames, calibration,
-//! scene.toml.
+//! Writes a simulated press as a folder for `tactile measure`: frames, calibration, scene.toml.
 //!
 //! ```text
 //! cargo run --release --example simulate_press -- target/press
@@ -10,7 +9,7 @@ use tactile_simulate::{CalibrationRun, Camera, PressOptions, PressScene, write_f
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args_os().nth(1).unwrap_or("target/press".into());
-    // Small frames of the paper's field of view.
+    // Small frames with the field of view of the paper.
     let camera = Camera::default().coarser(8);
     let scene = PressScene::new(PressOptions {
         camera,

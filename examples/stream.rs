@@ -1,4 +1,4 @@
-//! Force and modulus of a stream of frames, as they come from the camera.
+//! Force and modulus of a stream of frames from a camera.
 #![allow(clippy::print_stdout)]
 use ndarray::Array2;
 use std::error::Error;
@@ -13,7 +13,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ..PressOptions::default()
     };
     let trial = Trial::new(options, &CalibrationRun::default())?;
-    // Any source of frames will do; this one simulates loading and unloading.
+    // Any source of frames is possible. This one simulates loading and unloading.
     let mut source = trial.scene.stream(LoadCycle {
         largest_force_n: 1.2,
         period_s: 0.5,
@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let Some(force) = update.contact.and_then(|contact| contact.force_n) else {
             continue;
         };
-        // Two loads are needed before there is a modulus.
+        // A modulus needs at least two loads.
         let modulus = session.modulus().map_or("-".to_owned(), |m| {
             let [value, error] = [m.youngs_modulus_pa, m.standard_error_pa].map(|pa| pa * 1e-3);
             format!("{value:.2} ± {error:.2}")

@@ -1,5 +1,5 @@
-//! What a calibrated sensor costs a frame: local curve, flat field and lens, and the drift
-//! correction, beside a line from sums to force.
+//! Cost per frame of a calibrated sensor (local curve, flat field, lens and drift correction)
+//! compared with a line from sums to force.
 use criterion::BenchmarkGroup;
 use criterion::measurement::WallTime;
 use ndarray::Array2;
@@ -16,12 +16,12 @@ use tactile_simulate::{
     CalibrationRun, Camera, Gain, PressLoad, PressOptions, PressScene, PressSimulation,
 };
 
-/// Frames of each pipeline that the ratio of times is taken from, in turns: what slows the machine
-/// slows both.
+/// Number of frames of each pipeline for the ratio of times. The pipelines alternate, so that a
+/// slow machine affects both.
 const TURNS: usize = 400;
 const BARREL: f64 = 0.03;
 
-/// The default press seen by a camera with barrel distortion, vignetting and pixels higher than
+/// The default press with a camera that has barrel distortion, vignetting and pixels higher than
 /// wide.
 fn options(loads: Vec<PressLoad>) -> PressOptions {
     let camera = Camera::default();
@@ -55,8 +55,8 @@ fn histogram(made: &PressSimulation, load: usize) -> CalibrationFrame {
     CalibrationFrame::new(histogram, truth.contact.force_n, Branch::Loading).expect("a contact")
 }
 
-/// The stages of a sensor that was calibrated for all that the camera does, without and with the
-/// correction of lamps that changed, which a sensor's file asks for.
+/// The stages of a sensor calibrated for all effects of the camera, without and with the correction
+/// of changed lamps, which is the setting of a sensor file.
 fn sensor(trial: &Trial) -> [Pipeline; 2] {
     let forces = [0.1, 0.3, 0.5, 0.7, 0.9, 1.1, 1.3];
     let made = PressScene::new(PressOptions {
@@ -83,7 +83,7 @@ fn sensor(trial: &Trial) -> [Pipeline; 2] {
     })
 }
 
-/// Median times of a frame in sessions that take turns.
+/// Median times of a frame in alternating sessions.
 fn medians(sessions: &mut [Session; 3], frames: &[Array2<u8>]) -> [Duration; 3] {
     let mut times = [const { Vec::new() }; 3];
     for turn in 0..TURNS {
@@ -100,8 +100,8 @@ fn medians(sessions: &mut [Session; 3], frames: &[Array2<u8>]) -> [Duration; 3] 
     })
 }
 
-/// A frame's force with a calibrated sensor and with the short form of calibration, from the same
-/// frames in one run.
+/// The force of a frame with a calibrated sensor and with the short form of calibration, from the
+/// same frames in one run.
 pub(crate) fn calibrated(group: &mut BenchmarkGroup<'_, WallTime>) {
     let loads = vec![PressLoad::normal(0.7), PressLoad::normal(1.2)];
     let trial = Trial::new(options(loads), &CalibrationRun::default()).expect("a trial");
@@ -115,10 +115,11 @@ pub(crate) fn calibrated(group: &mut BenchmarkGroup<'_, WallTime>) {
     let times = medians(&mut sessions, frames).map(|time| 1e3 * time.as_secs_f64());
     let truth_n = trial.simulation.truth[1].contact.force_n;
     for ((name, time), session) in names.iter().zip(times).zip(&mut sessions) {
-        // The last turn's frame was the larger load's.
+        // The frame of the last turn was that of the larger load.
         let reading = session.push(frames[1].view()).expect("a frame").contact;
         let error = reading.expect("a contact").force_n.expect("a force").value / truth_n - 1.0;
-        // The middle of the frame, where the lens and the light of the calibration are the press's.
+        // The contact is in the middle of the frame, where lens and light of the calibration apply
+        // to the press.
         assert!(error.abs() < 0.01, "{name}: force off by {error}");
         let ratio = time / times[0];
         println!(

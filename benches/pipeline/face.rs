@@ -4,8 +4,8 @@ use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::{Object, Pipeline};
 use tactile_simulate::{PressOptions, PressScene, SurfacePattern, UniaxialOptions, UniaxialScene};
 
-/// Everything of two frames of a flat face as large as the ball's larger contact, plain and
-/// speckled: beside `everything_of_two_frames`.
+/// All results of two frames of a flat face that is as large as the ball's larger contact, plain
+/// and speckled, for comparison with `everything_of_two_frames`.
 pub(crate) fn flat_faces(c: &mut Criterion) {
     let ball = PressScene::new(PressOptions::default()).expect("default options");
     let side_m = ball.truth(1).contact.contact_radius_m * std::f64::consts::PI.sqrt();

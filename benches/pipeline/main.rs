@@ -1,9 +1,11 @@
-//! The pipeline on frames of 1392 × 1042 pixels with 200 control points: the paper's press, both
-//! results asserted, and a table of times and errors over 500 simulated scenes (two with `--test`
-//! or `--quick`) whose contacts cover 1 to 15 % of the frame: ten sensors, each calibrated once,
-//! and on each presses at random places with random forces and noise. Beside them what is skipped:
-//! a frame without contact, and what a stream keeps from frame to frame; and what a sensor
-//! calibrated for its curve, flat field and lens costs a frame beside a line from sums to force.
+//! The pipeline on frames of 1392 × 1042 pixels with 200 control points.
+//!
+//! It measures the press of the paper, checks both results, and prints a table of times and errors
+//! over 500 simulated scenes (two with `--test` or `--quick`). There are ten sensors, each
+//! calibrated once, with presses at random positions and with random forces and noise. Contacts
+//! cover 1 to 15 % of the frame. The table also contains skipped work: a frame without contact, and
+//! results that a stream keeps from frame to frame. Finally, it compares the cost per frame of a
+//! sensor with calibrated curve, flat field and lens with that of a line from sums to force.
 #![allow(clippy::print_stdout)]
 mod calibrated;
 mod face;
@@ -49,13 +51,13 @@ fn press(c: &mut Criterion) {
     group.finish();
 }
 
-/// Share of the frame under the larger load of sensor `k` of ten: 1.2 to 13 %, in equal ratios.
-/// Forces vary by a fifth around it, areas by a seventh.
+/// Fraction of the frame under the larger load of sensor `k` of ten: 1.2 to 13 %, in equal ratios.
+/// Forces vary by a fifth about the nominal value, and areas by a seventh.
 fn coverage(k: usize) -> f64 {
     0.012 * (0.13_f64 / 0.012).powf(k as f64 / 9.0)
 }
 
-/// A calibrated sensor and a ball whose larger load covers that share of the frame.
+/// A calibrated sensor and a ball whose larger load covers this fraction of the frame.
 fn sensor(k: usize) -> Trial {
     let camera = Camera::default();
     let material = if k.is_multiple_of(2) {
@@ -93,7 +95,7 @@ fn sensor(k: usize) -> Trial {
     Trial::new(PressOptions { loads, ..base }, &calibration).expect("a sensor")
 }
 
-/// One press on a sensor: another place, other forces, other noise.
+/// One press on a sensor, with its own position, forces and noise.
 fn scene(trial: &Trial, number: u64) -> PressScene {
     let mut state = number.wrapping_mul(0x9E37_79B9_7F4A_7C15);
     let mut uniform = || {
@@ -127,7 +129,7 @@ struct Table {
     force_error: Vec<f64>,
     height_error: Vec<f64>,
     strain_error: Vec<f64>,
-    /// Of a frame without contact, per cent of a frame's everything.
+    /// Time of a frame without contact, in per cent of the time for all results of a frame.
     empty_share: Vec<f64>,
 }
 
@@ -160,7 +162,7 @@ impl Table {
         self.add_errors(modulus, &all, made);
     }
 
-    /// A frame without contact, beside everything of a pair.
+    /// Adds a frame without contact, relative to all results of a pair.
     fn add_empty(
         &mut self,
         reference: &Arc<ReferenceFrame>,
@@ -252,9 +254,8 @@ fn scenes(_: &mut Criterion) {
     table.print();
     let worst = table.modulus_error.last().copied().unwrap_or(f64::NAN);
     assert!(worst < 3.0, "modulus error {worst} %");
-    // A frame without contact takes 0.2 ms, in which an image comes from memory: a tenth of a
-    // frame's everything, 0.27 ms, is less than the twentieth that was allowed when everything took
-    // 5.6 ms.
+    // A frame without contact takes 0.2 ms for reading the image from memory. A tenth of the time
+    // for all results of a frame, 0.27 ms, is less than the twentieth of the former 5.6 ms.
     if !quick {
         let share = table.empty_share[table.empty_share.len() / 2];
         assert!(share < 10.0, "a frame without contact takes {share} %");

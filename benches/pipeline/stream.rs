@@ -5,7 +5,7 @@ use std::hint::black_box;
 use tactile_imaging::pipeline::Session;
 use tactile_simulate::Trial;
 
-/// What a stream of frames takes for each, by what it shows.
+/// Time per frame of a stream, for different contents.
 pub(crate) fn stream(group: &mut BenchmarkGroup<'_, WallTime>, trial: &Trial) {
     let (one, two) = (&trial.simulation.frames[0], &trial.simulation.frames[1]);
     let empty = trial.scene.reference(9);

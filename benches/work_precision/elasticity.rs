@@ -1,4 +1,4 @@
-//! What each law of a ball's contact costs and misses.
+//! Times and errors of each contact law of a ball.
 
 use crate::study::Study;
 use tactile_imaging::elasticity::contact::{Bond, Layer, Waveguide};
@@ -7,8 +7,9 @@ use tactile_imaging::elasticity::modulus::{
 };
 use tactile_simulate::{self, ContactModel, Elastic, ElasticSphere, PressOptions, PressScene};
 
-/// The paper's two samples at 0.7 and 1.2 N as finite elements give them, force and contact radius
-/// without noise, by every law of a ball. The bench `finite_elements` times contact tables.
+/// The two samples of the paper at 0.7 and 1.2 N, with force and contact radius from finite
+/// elements without noise, evaluated by every law of a ball. The bench `finite_elements` times
+/// contact tables.
 pub(crate) fn laws(study: &mut Study) {
     study.error_label = "rms error of the modulus, relative";
     const RADIUS_M: f64 = 3e-3;
@@ -21,7 +22,7 @@ pub(crate) fn laws(study: &mut Study) {
     let guide = Waveguide::new(layers.collect()).expect("a guide");
     let hertz = HertzSphere::new(RADIUS_M, 0.5).expect("a ball");
     let layered = SphereOnWaveguide::new(RADIUS_M, 0.5, &guide, Bond::Bonded).expect("a ball");
-    // Name, whether a pipeline for a ball on a known guide takes it by default, the law.
+    // Name, whether it is the default of a pipeline for a ball on a known guide, and the law.
     let laws: [(&str, bool, Box<dyn ModulusEstimator>); 4] = [
         ("Hertz, rigid guide", false, Box::new(hertz.clone())),
         (
@@ -58,7 +59,8 @@ pub(crate) fn laws(study: &mut Study) {
     for (name, is_default, law) in laws {
         let job = || {
             samples.each_ref().map(|(truth, loads)| {
-                // Layers in series leave nothing for the harder sample: as far off as can be.
+                // Layers in series leave no compliance for the harder sample: the error is as large
+                // as possible.
                 law.estimate(loads)
                     .map_or(1.0, |found| found.youngs_modulus_pa / truth - 1.0)
             })

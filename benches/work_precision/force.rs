@@ -1,4 +1,5 @@
-//! The contact radius of a frame: with and without the profile's fit, and how the fit is done.
+//! The contact radius of a frame: with and without the fit of the profile, and with different
+//! settings of the fit.
 
 use crate::study::Study;
 use tactile_imaging::force::{

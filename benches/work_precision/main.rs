@@ -1,4 +1,4 @@
-//! Time against error: every knob that trades one for the other, stage by stage and for the whole
+//! Time against error for every setting that affects both, for each stage and for the whole
 //! pipeline.
 //!
 //! ```console
@@ -7,10 +7,12 @@
 //! cargo bench -p tactile-benches --bench work_precision -- matching  # one study
 //! cargo bench -p tactile-benches --bench work_precision -- --quick --within=1.5   # fails where a default lies further behind
 //! ```
-//! Writes `target/work_precision/STUDY.csv`. A default is behind the front where some setting is more than 1.2
-//! times faster and no less accurate, or more than 1.2 times more accurate and no slower. With
-//! `--within=FACTOR` that factor counts, and such a default fails the run. With `--test` everything
-//! runs once and nothing is judged: one timing is none.
+//! Writes `target/work_precision/STUDY.csv`.
+//!
+//! A default is behind the front if another setting is more than 1.2 times faster and no less
+//! accurate, or more than 1.2 times more accurate and no slower. With `--within=FACTOR` that factor
+//! applies, and such a default fails the run. With `--test` everything runs once without a
+//! judgement, because a single timing is not reliable.
 #![allow(missing_docs, clippy::print_stdout)]
 
 mod elasticity;
@@ -26,10 +28,10 @@ use std::path::Path;
 use std::process::ExitCode;
 use study::{Effort, Study};
 
-/// How far behind the front a default may lie without a mark, unless `--within=` is given.
+/// Largest distance of a default from the front without a mark, unless `--within=` is given.
 const WITHIN: f64 = 1.2;
 
-/// A name and what fills the study of that name.
+/// The name of a study and the function that fills it.
 type Filler = (&'static str, fn(&mut Study));
 
 const STUDIES: [Filler; 11] = [

@@ -1,4 +1,4 @@
-//! Matchers on 105 points in space: options of the fast one, and the others.
+//! Matchers on 105 points in space: options of the default matcher, and the other matchers.
 
 use crate::study::Study;
 use tactile_imaging::matching::labelling::Neighbourhood;
@@ -9,7 +9,7 @@ use tactile_imaging::matching::{
 
 type Scene = tactile_benches::Scene<3>;
 
-/// Of 105 points.
+/// A scene of 105 points.
 fn scene(seed: u64, outliers: usize, noise: f64) -> Scene {
     Scene::new(seed, 105, 0.025, outliers, noise)
 }

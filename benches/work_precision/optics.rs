@@ -1,11 +1,13 @@
-//! Rays of the tracer: guided share of a flat slab against a run of 64 times the finest.
+//! Number of rays of the tracer: guided fraction of a flat slab compared with 64 times the largest
+//! number.
 
 use crate::study::Study;
 use tactile_imaging::optics::surface::Flat;
 use tactile_imaging::optics::trace::{Slab, SlabLayer, TraceOptions, trace};
 use tactile_imaging::optics::{Geometry, Led};
 
-/// Rays in the plane of one section: the exact problem of a guide that is long across it.
+/// Rays in the plane of one section: the exact problem of a guide that is long in the transverse
+/// direction.
 pub(crate) fn section(study: &mut Study) {
     rays(study, Geometry::Section);
 }

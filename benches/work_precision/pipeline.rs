@@ -1,4 +1,4 @@
-//! The whole pipeline: strain between two loads against control points, smoothing, camera and
+//! The whole pipeline: strain between two loads, depending on control points, smoothing, camera and
 //! matcher.
 
 use crate::study::Study;
@@ -8,8 +8,7 @@ use tactile_imaging::pipeline::Binning;
 use tactile_simulate::Trial;
 use tactile_simulate::{CalibrationRun, Camera, PressLoad, PressOptions};
 
-/// Presses on one sensor that differ in force and noise: one alone would say what its noise
-/// happened to do.
+/// Presses on one sensor with different forces and noise. A single press would depend on its noise.
 fn trials(shape: [usize; 2], count: u64) -> Vec<Trial> {
     let camera = Camera {
         shape,
@@ -30,8 +29,8 @@ fn trials(shape: [usize; 2], count: u64) -> Vec<Trial> {
     (0..count).map(trial).collect()
 }
 
-/// Root mean square over the presses of the largest error of a normal strain; the time is that of
-/// all of them.
+/// Root mean square over the presses of the largest error of a normal strain, and the time of all
+/// presses.
 fn run(
     study: &mut Study,
     trials: &[Trial],

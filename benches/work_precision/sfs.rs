@@ -15,7 +15,7 @@ fn field<T>([rows, columns]: [usize; 2], at: impl Fn(f64, f64) -> T) -> Array2<T
     })
 }
 
-/// Mean absolute error over the height of the surface, a constant being free.
+/// Mean absolute error relative to the height of the surface, with a free constant.
 fn mean_error(
     found: &Array2<f64>,
     truth: &Array2<f64>,
@@ -92,7 +92,7 @@ fn surface(
     });
 }
 
-/// A Gaussian bump from its slopes, over a square that it does not fill.
+/// A Gaussian bump from its slopes, over a square that is larger than the bump.
 pub(crate) fn slopes(study: &mut Study) {
     study.error_label = "mean error over the height";
     let square = |n: usize| [n; 2];
@@ -106,7 +106,7 @@ pub(crate) fn slopes(study: &mut Study) {
         integral::<f64>(study, "least squares", shape, false, &method);
     }
     if study.effort == Effort::Full {
-        // The paper's frames.
+        // The frame size of the paper.
         integral::<f64>(study, "cosine, frame", [1042, 1392], false, &CosinePoisson);
         integral::<f32>(study, "frame, f32", [1042, 1392], false, &CosinePoisson);
     }

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// How long each setting is timed.
+/// Duration of the timing of each setting.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Effort {
     Once,
@@ -12,11 +12,11 @@ pub(crate) enum Effort {
     Full,
 }
 
-/// Differences below this are rounding, not error.
+/// Differences below this are due to rounding.
 const ROUNDING: f64 = 1e-14;
 
-/// Settings whose times or errors differ by less than this factor count as equal in it: times of
-/// one job scatter by as much.
+/// Times or errors of settings that differ by less than this factor count as equal: times of one
+/// job scatter by as much.
 const AS_GOOD: f64 = 0.98;
 
 pub(crate) struct Entry {
@@ -44,7 +44,7 @@ impl Study {
         }
     }
 
-    /// `quick` or `full`, whichever is asked for.
+    /// `quick` or `full`, according to the effort.
     pub(crate) fn choose<T>(&self, quick: T, full: T) -> T {
         if self.effort == Effort::Full {
             full
@@ -53,8 +53,8 @@ impl Study {
         }
     }
 
-    /// Times a job (least of many runs) and takes the error of its answer. A knob's default must be
-    /// said to be one.
+    /// Times a job (the shortest of many runs) and computes the error of its result. The default
+    /// setting must be marked as such.
     pub(crate) fn run<R>(
         &mut self,
         knob: &'static str,
@@ -93,9 +93,9 @@ impl Study {
         });
     }
 
-    /// How far behind the front a setting lies, in time or in error, whichever is worse: times
-    /// faster that one is which is no less accurate, or times more accurate one that is no slower.
-    /// One on the front.
+    /// Distance of a setting from the front, as the larger of two factors: the speed-up by a
+    /// setting that is no less accurate, and the gain in accuracy by a setting that is no slower.
+    /// It is one on the front.
     pub(crate) fn behind(&self, entry: &Entry) -> f64 {
         let factor = |other: &Entry| {
             let (faster, better) = (entry.seconds / other.seconds, entry.error / other.error);
@@ -106,7 +106,8 @@ impl Study {
         self.entries.iter().map(factor).fold(1.0, f64::max)
     }
 
-    /// Prints the table; returns how many defaults lie further behind the front than `within`.
+    /// Prints the table. Returns the number of defaults whose distance from the front exceeds
+    /// `within`.
     pub(crate) fn judge(&self, within: f64) -> usize {
         println!("\n{} ({})", self.name, self.error_label);
         println!(

@@ -1,4 +1,4 @@
-//! Splines: kernel, number of points, scalar type, way of solving, λ.
+//! Splines: kernel, number of points, scalar type, solver and λ.
 
 use crate::study::Study;
 use tactile_benches::Problem;

@@ -1,4 +1,4 @@
-//! Uncertain numbers beside 80-digit references (`evidence/reference_cases.py`).
+//! Uncertain numbers compared with 80-digit references (`evidence/reference_cases.py`).
 use serde_json::Value;
 use tactile_core::{Source, Uncertain};
 
@@ -42,7 +42,8 @@ fn operations_agree_with_high_precision() {
         ] {
             let expected = numbers(&case[name]);
             let at = format!("{name} of {}", case["name"]);
-            // Some roundings of the value, and of the total error: parts of one source may cancel.
+            // Some roundings of the value and of the total error, because parts of one source may
+            // cancel.
             let value_error = (found.value / expected[0] - 1.0).abs();
             assert!(value_error < 2e-15, "{at}: {value_error:e}");
             let scale = found.standard_error();

@@ -1,8 +1,9 @@
-//! How well gels lit in colours are read, on worlds whose answers are known exactly.
+//! Accuracy of gels under coloured light, on scenes with exactly known results.
 //!
-//! `cargo run --release -p tactile-gel --example exact_worlds -- [WORLDS] [FIRST SEED]` renders contacts
-//! of 10 to 80 px and slopes from 0.03 to 1.2 on a half-space and on a bonded layer, under many lamps,
-//! untouched frames, frames of this sensor and of others, and prints what is within its bounds.
+//! `cargo run --release -p tactile-gel --example exact_worlds -- [WORLDS] [FIRST SEED]` renders
+//! contacts of 10 to 80 px with slopes from 0.03 to 1.2, on a half-space and on a bonded layer,
+//! under many lamps. It also renders untouched frames, frames of this sensor and frames of other
+//! sensors. It prints which results are within their bounds.
 
 #![allow(clippy::print_stdout)]
 
@@ -21,7 +22,7 @@ const BALL_PX: f64 = 40.0;
 const LAYER_M: f64 = 4e-3;
 const RATIO: f64 = 0.48;
 const MODULUS_PA: f64 = 1e5;
-/// Worlds under the same lamps.
+/// Number of scenes under the same lamps.
 const WORLDS_PER_GEL: u64 = 20;
 
 fn main() {
@@ -33,12 +34,12 @@ fn main() {
     times(seed);
 }
 
-/// A gel under lamps of its own, and what was calibrated on twenty balls.
+/// A gel under its own lamps, and its calibration on twenty balls.
 struct Unit {
     gel: ColourGel,
     sensor: GelSensor,
     layer: bool,
-    /// Seconds that the calibration took.
+    /// Duration of the calibration in seconds.
     seconds: f64,
 }
 
@@ -75,7 +76,7 @@ impl Unit {
                 draw(0.15, 0.85) * shape[1] as f64,
                 draw(0.2, 0.8) * shape[0] as f64,
             ];
-            // Every fifth is deep, for steep slopes.
+            // Every fifth press is deep, for steep slopes.
             let reach = if k % 5 == 0 {
                 draw(0.8, 1.2)
             } else {
@@ -108,7 +109,7 @@ impl Unit {
     }
 }
 
-/// Relative errors, and how many intervals hold.
+/// Relative errors, and the number of intervals that contain the true value.
 #[derive(Default)]
 struct Tally {
     errors: Vec<f64>,
@@ -208,7 +209,7 @@ fn exact(worlds: u64, seed: u64) {
     tallies.iter().for_each(|(name, tally)| tally.print(name));
 }
 
-/// A press somewhere.
+/// A press at a random position.
 fn pressed(unit: &Unit, gel: &ColourGel, seed: u64) -> Array3<u8> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut draw = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
@@ -218,7 +219,7 @@ fn pressed(unit: &Unit, gel: &ColourGel, seed: u64) -> Array3<u8> {
     gel.frame(&face(unit.layer).depth_px(gel.shape, &[press]), seed)
 }
 
-/// Untouched frames, right ones and wrong ones.
+/// Untouched frames, valid and invalid.
 fn frames(untouched: u64, seed: u64) {
     let units: Vec<Unit> = (0..5)
         .map(|k| Unit::new([240, 320], seed + 77_000 + 500 * k))

@@ -1,5 +1,5 @@
-//! The presses of `examples/data/colour`: a bonded layer of 3 mm under a ball of 1.2 mm, whose face
-//! is known in closed form.
+//! The presses of `examples/data/colour`: a bonded layer of 3 mm under a ball of 1.2 mm, whose
+//! surface is known in closed form.
 //!
 //! `cargo run --release -p tactile-gel --example example_presses -- FOLDER` writes the reference and
 //! six presses as PNG.

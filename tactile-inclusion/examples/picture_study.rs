@@ -1,14 +1,14 @@
-//! Errors of the search from the whole face over a folder of blocks solved in three dimensions.
+//! Errors of the search in the whole face, on a folder of blocks solved in three dimensions.
 //!
 //! ```text
 //! cargo run --release -p tactile-inclusion --example picture_study -- FOLDER [SEEDS] [NAMES]
 //! ```
 //!
-//! FOLDER holds `scenes.csv` and for every scene a file `NAME.csv` (load_index, x_m, y_m,
-//! pressure_pa on a grid of 0.5 mm over half the face, over a quarter where the lump has a twin),
-//! as `evidence/inclusion_pictures.py` makes them with CalculiX. Every scene is turned about the
-//! axis, sampled on cells of 1 mm, and searched with SEEDS draws of the sensor's errors. NAMES
-//! keeps the scenes whose names begin with one of them, separated by commas.
+//! FOLDER contains `scenes.csv` and for every scene a file `NAME.csv` (load_index, x_m, y_m,
+//! pressure_pa), as created by `evidence/inclusion_pictures.py` with CalculiX. The grid of 0.5 mm
+//! covers half of the face, or a quarter if the lump has a twin. Every scene is rotated about the
+//! axis, sampled on cells of 1 mm, and searched with SEEDS draws of the errors of the sensor. NAMES
+//! selects the scenes whose names begin with one of them, separated by commas.
 #![allow(clippy::print_stdout)]
 
 #[path = "inclusion_study/shared.rs"]
@@ -26,13 +26,13 @@ use tactile_inclusion::{
     TissueBlock,
 };
 
-/// Pressures of each load on cells of 1 mm, whose middles are given.
+/// Pressures of each load on cells of 1 mm, with the given centres.
 struct Picture {
     positions_m: Vec<[f64; 2]>,
     pressures_pa: Vec<Vec<f64>>,
 }
 
-/// The picture of a scene's file, mirrored to the whole face.
+/// The pressure image of a scene's file, mirrored to the whole face.
 fn picture(path: &Path, loads: usize, is_quarter: bool) -> Result<Picture, Box<dyn Error>> {
     let mut known: Vec<HashMap<[i64; 2], f64>> = vec![HashMap::new(); loads];
     for row in table(path)? {
@@ -40,8 +40,8 @@ fn picture(path: &Path, loads: usize, is_quarter: bool) -> Result<Picture, Box<d
         // Grid indices.
         let [x, y] = [number(&row, "x_m")?, number(&row, "y_m")?];
         let [x, y] = [x, y].map(|value| (value / 0.5e-3).round() as i64);
-        // The pressure near the outer part of the mirror between two lumps is that of nodes whose
-        // elements are cut there: up to a tenth off within a millimetre.
+        // Near the outer part of the mirror plane between two lumps, the pressure is that of nodes
+        // whose elements are cut there: it is wrong by up to a tenth within a millimetre.
         if is_quarter && x <= 2 && y > 11 {
             continue;
         }
@@ -56,7 +56,7 @@ fn picture(path: &Path, loads: usize, is_quarter: bool) -> Result<Picture, Box<d
     let mut pressures_pa = vec![Vec::new(); loads];
     for i in -14..14i64 {
         for k in -14..14i64 {
-            // Four points of the grid around a cell's middle.
+            // Four points of the grid around the centre of a cell.
             let corners = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[a, b]| [2 * i + a, 2 * k + b]);
             let mean = |known: &HashMap<[i64; 2], f64>| -> Option<f64> {
                 let values: Option<Vec<f64>> =
@@ -93,7 +93,7 @@ fn smooth_field(positions_m: &[[f64; 2]], length_m: f64, rng: &mut ChaCha8Rng) -
     field
 }
 
-/// Frames with the sensor's errors: white noise of 0.75 % of the largest pressure on pixels of
+/// Frames with the errors of the sensor: white noise of 0.75 % of the largest pressure on pixels of
 /// 86 µm, and the smooth errors of a calibration.
 fn measured(
     picture: &Picture,
@@ -127,7 +127,7 @@ fn measured(
     frames.collect()
 }
 
-/// Prints what is told of a lump beside the truth.
+/// Prints the results for a lump and the true values.
 fn print_lump(inclusion: &Inclusion, centre_m: [f64; 2], truth: [f64; 3]) {
     if let Some(position) = &inclusion.position_m {
         let off = [0, 1].map(|k| position[k].value - centre_m[k]);
@@ -191,7 +191,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let truth = [diameter, number(row, "depth_m")?, number(row, "E1_pa")?];
         for seed in 0..seeds {
             let mut rng = ChaCha8Rng::seed_from_u64(1000 * seed + index as u64);
-            // The lump anywhere around the axis.
+            // The lump is at a random angle around the axis.
             let turn = core::f64::consts::TAU * rng.random::<f64>();
             let turned = |[x, y]: [f64; 2]| {
                 [
@@ -231,7 +231,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             );
             for inclusion in &estimate.inclusions() {
                 let x = number(row, "x_m")?;
-                // Of a pair, the one that is nearer.
+                // The nearer lump of a pair.
                 let places = [
                     turned([x, 0.0]),
                     turned([if is_pair { -x } else { x }, 0.0]),

@@ -1,16 +1,16 @@
-//! What each mechanism of the default matcher is worth: all scenes with it and without it, the
-//! differences beside their standard errors.
+//! Contribution of each mechanism of the default matcher: all scenes with it and without it, and
+//! the differences with their standard errors.
 //!
 //! ```text
 //! TACTILE_DATA=FOLDER cargo run --release -p tactile-match --features ablation --example ablation -- [FIRST_SEED SEEDS] [MECHANISM ...]
 //! ```
 //!
-//! Scenes: the published benchmark of Chui and Rangarajan (where the data are), generated bells and
-//! discs, sets that are bent, cropped, turned and stretched, dense sets, and sets of thousands.
-//! Printed are, for every family of scenes, the mean over the scenes of the error of the warp (in
-//! per cent of the model's radius), of the share of right pairs, of the Brier score of the
-//! confidences (all three in per cent), and the ratio of the times. Then for every mechanism that
-//! is switched off their changes.
+//! The scenes are the published benchmark of Chui and Rangarajan (if the data are available),
+//! generated bells and discs, bent, cropped, rotated and stretched sets, dense sets, and sets of
+//! thousands of points. For every family of scenes, the means over the scenes are printed: the
+//! error of the warp (in per cent of the radius of the model), the fraction of correct pairs and
+//! the Brier score of the confidences (both in per cent), and the ratio of the times. Then the
+//! changes are printed for every mechanism that is switched off.
 #![allow(clippy::print_stdout)]
 use nalgebra::{Point, SMatrix, SVector};
 use std::ops::ControlFlow;
@@ -50,19 +50,19 @@ struct Scene<const D: usize> {
     family: &'static str,
     model: Vec<Point<f64, D>>,
     target: Vec<Point<f64, D>>,
-    /// Where the model points truly go.
+    /// True positions of the model points.
     truth: Vec<Point<f64, D>>,
     /// Rows of their true partners.
     partner: Vec<Option<usize>>,
 }
 
-/// Error, share of right pairs, Brier score, seconds, and whether most pairs are wrong without a
-/// doubt.
+/// Error, fraction of correct pairs, Brier score, seconds, and whether most pairs are wrong without
+/// a doubt.
 type Score = [f64; 5];
 
 impl<const D: usize> Scene<D> {
-    /// A scene from where the model goes: `kept` rows in sight, noise along each axis, so many
-    /// targets strewn over the box of the others.
+    /// A scene from the displaced model: the `kept` rows are visible, the noise is per axis, and
+    /// additional random targets lie in the box of the others.
     fn new(
         family: &'static str,
         model: Vec<Point<f64, D>>,
@@ -174,8 +174,8 @@ fn warp<const D: usize>(
     model.iter().map(|p| p + field(p) * factor).collect()
 }
 
-/// Bells and discs of 105 to 200 points: three sizes of the deformation, clean, noisy, with
-/// clutter, with points missing.
+/// Bells and discs of 105 to 200 points: three sizes of the deformation; clean, noisy, with
+/// clutter, and with missing points.
 fn bells<const D: usize>(n: usize, seed: u64, scenes: &mut Vec<Scene<D>>) {
     for (level, size) in [0.06, 0.16, 0.3].into_iter().enumerate() {
         for (variant, family) in ["bell clean", "bell noise", "bell clutter", "bell missing"]
@@ -209,7 +209,7 @@ fn bells<const D: usize>(n: usize, seed: u64, scenes: &mut Vec<Scene<D>>) {
     }
 }
 
-/// Sets of the unit cube that are bent, cropped, turned, or stretched and cropped.
+/// Sets of the unit cube that are bent, cropped, rotated, or stretched and cropped.
 fn cubes<const D: usize>(seed: u64, scenes: &mut Vec<Scene<D>>) {
     let mut add = |family,
                    n: usize,
@@ -321,7 +321,7 @@ fn large(n: usize, seed: u64, scenes: &mut Vec<Scene<3>>) {
     }
 }
 
-/// The published benchmark, where its data are.
+/// The published benchmark, if its data are available.
 fn published(scenes: &mut Vec<Scene<2>>) -> Result<(), Box<dyn std::error::Error>> {
     let root = std::env::var("TACTILE_DATA").unwrap_or_default();
     for kind in ["def", "noise", "outlier", "occlusion", "rot"] {

@@ -1,16 +1,17 @@
-//! What the default matcher's confidences, standard deviations and doubts are worth: sets that are
-//! bent, cropped, turned and stretched, with noise and outliers, of jittered grids and of random
-//! points, in the plane and in space.
+//! Calibration of the default matcher's confidences, standard deviations and doubts. The sets are
+//! bent, cropped, rotated and stretched, with noise and outliers; they are jittered grids and
+//! random points, in the plane and in space.
 //!
 //! ```text
 //! cargo run --release -p tactile-match --example confidence -- [FIRST_SEED SEEDS]
 //! ```
 //!
-//! The constants of the confidences were chosen on seeds 0 to 19, those of answers with a doubt on 0
-//! to 7. Others are held out (default: 100 to 103). Prints for every tenth of confidence the pairs,
-//! their mean confidence and the share that is right. For every kind of scene the share of
-//! coordinates within one standard deviation of the truth, and how many scenes have less than 90 %
-//! right pairs, with and without a doubt.
+//! The constants of the confidences were chosen on seeds 0 to 19, and those of results with a doubt
+//! on 0 to 7. Other seeds are independent (default: 100 to 103). For every tenth of confidence, the
+//! number of pairs, their mean confidence and the fraction of correct pairs are printed. For every
+//! kind of scene, the fraction of coordinates within one standard deviation of the true values is
+//! printed, and the number of scenes with less than 90 % of correct pairs, with and without a
+//! doubt.
 #![allow(clippy::print_stdout)]
 use nalgebra::{Point, SVector};
 use tactile_match::{AnnealedSoftassign, MatchError, Matching, PointMatcher};
@@ -28,16 +29,16 @@ use scene::Scene;
 use stream::Stream;
 use tenths::Tenths;
 
-/// What is done to the points of the unit cube.
+/// Transformation of the points of the unit cube.
 #[derive(Clone, Copy, PartialEq)]
 enum Change {
     /// Bent.
     Bent,
-    /// Bent, and seen up to three quarters of the width.
+    /// Bent, and visible up to three quarters of the width.
     Cropped,
-    /// Bent and turned about the centre, in degrees.
+    /// Bent, and rotated about the centre, in degrees.
     Turned(f64),
-    /// Stretched along x and seen through the old window.
+    /// Stretched along x, and seen through the original window.
     Stretched(f64),
 }
 
@@ -46,7 +47,7 @@ struct Kind {
     change: Change,
     /// In mean spacings.
     noise: f64,
-    /// Share of the points in sight.
+    /// Fraction of the visible points.
     outliers: f64,
     /// Random points in place of a jittered grid.
     random: bool,

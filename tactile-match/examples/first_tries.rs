@@ -1,14 +1,15 @@
-//! What a newcomer feeds the default matcher first: the same points twice, drifts, lattices that go
-//! on beyond the view, noisy grids, partial overlaps, stretched and bent planes. Prints for every
-//! family how many answers are right, refused (with a doubt) and wrong without a doubt.
+//! Inputs on which a new user tries the default matcher: the same points twice, drifts, lattices
+//! that extend beyond the view, noisy grids, partial overlaps, stretched and bent planes. For every
+//! family, the numbers of results are printed that are correct, refused (with a doubt) and wrong
+//! without a doubt.
 //!
 //! ```text
 //! cargo run --release -p tactile-match --example first_tries -- [FAMILY ...]
 //! ```
 //!
-//! An answer is right if at least 99 in 100 of the true pairs are found (97 with noise, since
-//! random points within the noise of each other trade places), and wrong if fewer than nine in ten
-//! of the pairs found, or half of the true ones, are right.
+//! A result is correct if at least 99 of 100 true pairs are found (97 with noise, because random
+//! points closer than the noise are exchanged). It is wrong if fewer than nine of ten found pairs,
+//! or fewer than half of the true pairs, are correct.
 #![allow(clippy::print_stdout)]
 use nalgebra::{Point, Point2, SVector};
 use std::collections::BTreeMap;
@@ -20,7 +21,7 @@ use tactile_match::{AnnealedSoftassign, Doubt, MatchError, SoftassignWorkspace};
 mod stream;
 use stream::Stream;
 
-/// Answers of one family.
+/// Results of one family.
 #[derive(Default)]
 struct Tally {
     scenes: usize,
@@ -31,7 +32,7 @@ struct Tally {
     doubts: BTreeMap<String, usize>,
 }
 
-/// Matches, prints what is not right, and counts.
+/// Matches, prints results that are not correct, and counts.
 fn judge<const D: usize>(
     tally: &mut Tally,
     name: &str,
@@ -78,7 +79,7 @@ fn judge<const D: usize>(
     Ok(())
 }
 
-/// Targets in a new order, with the row of each model point's partner.
+/// Targets in a new order, with the row of the partner of each model point.
 fn shuffle<const D: usize>(
     images: &[(usize, Point<f64, D>)],
     points: usize,
@@ -164,7 +165,8 @@ fn lattices(tally: &mut Tally) -> Result<(), MatchError> {
     Ok(())
 }
 
-/// Points of the unit square, where they go, with noise, some missing on each side.
+/// Points of the unit square and their displaced positions, with noise and missing points on each
+/// side.
 #[allow(clippy::too_many_arguments)]
 fn plane(
     tally: &mut Tally,
@@ -259,7 +261,7 @@ fn bent(tally: &mut Tally, sizes: &[usize]) -> Result<(), MatchError> {
     Ok(())
 }
 
-/// Noisy grids of 9 by 7 markers, shifted a little.
+/// Noisy grids of 9 by 7 markers, slightly shifted.
 fn grids(tally: &mut Tally) -> Result<(), MatchError> {
     for seed in 0..40 {
         let mut stream = Stream(seed);
@@ -284,7 +286,7 @@ fn grids(tally: &mut Tally) -> Result<(), MatchError> {
     Ok(())
 }
 
-/// Points of space of which 70 % are seen in both sets.
+/// Points in space, 70 % of which are in both sets.
 fn overlaps(tally: &mut Tally) -> Result<(), MatchError> {
     for seed in 0..48 {
         let mut stream = Stream(seed + 100);

@@ -1,11 +1,11 @@
-//! How the pairs of nearest neighbours, assignment, drift and labelling are judged: right answers that
-//! are doubted, and wrong ones that are not, of still, shifted, bent, noisy and unrelated sets.
+//! Doubts of pairs of nearest neighbours, assignment, drift and labelling: correct results with a
+//! doubt and wrong results without one, for unchanged, shifted, bent, noisy and unrelated sets.
 //!
 //! ```text
 //! cargo run --release -p tactile-match --example judgement
 //! ```
 //!
-//! An answer is right if nine in ten of its pairs are, and wrong if a fifth are not.
+//! A result is correct if nine of ten pairs are, and wrong if a fifth are not.
 #![allow(clippy::print_stdout)]
 use nalgebra::{Point, SVector};
 use tactile_match::{

@@ -1,12 +1,12 @@
-//! Time, memory and right pairs of large sets in space under a smooth deformation of a tenth of
+//! Time, memory and correct pairs of large sets in space under a smooth deformation of a tenth of
 //! their size, shuffled.
 //!
 //! ```text
 //! cargo run --release -p tactile-match --example large_sets -- POINTS [surface|volume] [NOISE OUTLIERS [SEED]]
 //! ```
 //!
-//! Noise is a standard deviation along an axis in shares of the size (the largest extent), outliers
-//! a share of the points. Memory is the peak of the whole process (Linux).
+//! Noise is a standard deviation per axis as a fraction of the size (the largest extent), and
+//! outliers are a fraction of the points. Memory is the peak of the whole process (Linux).
 #![allow(clippy::print_stdout)]
 use nalgebra::{Point3, Vector3};
 use std::ops::ControlFlow;
@@ -20,7 +20,7 @@ mod stream;
 use disc::disc;
 use stream::Stream;
 
-/// A bell over a jittered disc of diameter 2, or points strewn in a cube of side 2.
+/// A bell over a jittered disc of diameter 2, or random points in a cube of side 2.
 fn points(n: usize, surface: bool, stream: &mut Stream) -> Vec<Point3<f64>> {
     if surface {
         return disc(n, 0.15, stream);

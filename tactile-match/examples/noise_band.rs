@@ -1,14 +1,16 @@
-//! The default matcher beside coherent point drift under noise from 10⁻⁵ to a tenth of the size.
+//! The default matcher compared with coherent point drift for noise from 10⁻⁵ to a tenth of the
+//! size.
 //!
 //! ```text
 //! cargo run --release -p tactile-match --example noise_band -- [FIRST_SEED SEEDS]
 //! ```
 //!
 //! Random points of the unit square and cube under a mild affine map, with and without a bend,
-//! without outliers. Prints for every number of points and noise the share of points without a
-//! partner, the share of wrong partners, the estimated over the true standard deviation of the noise
-//! (geometric mean), the mean distance of the warp from the truth over the noise, and this distance
-//! over that of coherent point drift with its standard error. The last column has the doubted scenes.
+//! without outliers. Each row is a number of points and a noise. It contains the fractions of
+//! points without a partner and of wrong partners, and the ratio of the estimated and the true
+//! standard deviation of the noise (geometric mean). It also contains the mean distance of the warp
+//! from the true positions divided by the noise, and the ratio of this distance to that of coherent
+//! point drift with its standard error. The last column is the number of scenes with a doubt.
 #![allow(clippy::print_stdout)]
 use nalgebra::{Point, SVector};
 use tactile_match::{AnnealedSoftassign, CoherentPointDrift, MatchError, Matching, PointMatcher};

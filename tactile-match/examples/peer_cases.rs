@@ -1,15 +1,15 @@
-//! Matches the cases of a file with the default matcher, writes the answers in the same kind of
-//! file, and prints one line a level: besides error and time the answers with a doubt, those with
-//! fewer than nine in ten right pairs, and those of the latter without a doubt. Then what the
-//! confidences of all pairs are worth.
+//! Matches the cases of a file with the default matcher, writes the results in the same format, and
+//! prints one line per level. A line contains the error and the time, the results with a doubt,
+//! those with fewer than nine of ten correct pairs, and how many of the latter have no doubt.
+//! Finally the calibration of the confidences of all pairs is printed.
 //!
 //! ```text
 //! cargo run --release -p tactile-match --example peer_cases -- CASES.txt [RESULTS.txt]
 //! ```
 //!
-//! Cases are those of `support/cases.rs`. A result is `case NAME milliseconds`, then for each model
-//! row `w` (warped) and `a` (target row or −1). The time is the least of five calls through a warm
-//! workspace.
+//! For the format of cases see `support/cases.rs`. A result is `case NAME milliseconds`, then for
+//! each model row `w` (warped) and `a` (target row or −1). The time is the shortest of five calls
+//! with a warm workspace.
 #![allow(clippy::print_stdout)]
 use nalgebra::Point;
 use std::collections::BTreeMap;
@@ -25,14 +25,14 @@ mod tenths;
 use cases::Case;
 use tenths::Tenths;
 
-/// What is printed of one case.
+/// The printed results of one case.
 struct Score {
     error: f64,
     right: f64,
     milliseconds: f64,
     starts: usize,
     doubted: bool,
-    /// Whether fewer than nine in ten of the pairs that were found are right.
+    /// Whether fewer than nine of ten found pairs are correct.
     wrong: bool,
 }
 

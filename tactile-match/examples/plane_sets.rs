@@ -1,6 +1,7 @@
-//! Time and right pairs of large sets in the plane, still or moved, with noise and missing points,
-//! beside what the nearest partner about the true places would pair. Of random points πσ² have a neighbour that explains their target
-//! better, σ in mean spacings: no matcher tells those.
+//! Time and correct pairs of large sets in the plane, unchanged or displaced, with noise and
+//! missing points, compared with pairing each target with the point nearest to its true position.
+//! With σ in mean spacings, a fraction πσ² of random points have a neighbour that explains their
+//! target better: no matcher can distinguish them.
 //!
 //! ```text
 //! cargo run --release -p tactile-match --example plane_sets -- POINTS [NOISE [MOTION [MISSING [SEED]]]]
@@ -18,7 +19,7 @@ use tactile_match::{AnnealedSoftassign, SoftassignWorkspace};
 mod stream;
 use stream::Stream;
 
-/// Where a point of the unit square goes.
+/// Displaced position of a point of the unit square.
 fn image(motion: &str, p: &Point2<f64>) -> Point2<f64> {
     let (drift, stretch, bend) = match motion {
         "drift" => (0.05, 1.0, 0.0),
@@ -33,7 +34,7 @@ fn image(motion: &str, p: &Point2<f64>) -> Point2<f64> {
     )
 }
 
-/// For each place the row of the nearest point, by cells of a mean spacing.
+/// Row of the nearest point to each position, by cells of a mean spacing.
 fn nearest(places: &[Point2<f64>], points: &[Point2<f64>], spacing: f64) -> Vec<Option<usize>> {
     let mut cells = std::collections::HashMap::<[i64; 2], Vec<usize>>::new();
     let cell = |p: &Point2<f64>| [0, 1].map(|k| (p[k] / spacing).floor() as i64);
@@ -66,7 +67,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut stream = Stream(seed);
     let (mut model, mut truth, mut images) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..n {
-        // Seen through the unit square, beyond which the points go on.
+        // Seen through the unit square, beyond which there are more points.
         let p = Point2::new(stream.next(), stream.next()) * 1.2 - SVector::repeat(0.1);
         let inside = |p: &Point2<f64>| p.iter().all(|c| (0.0..1.0).contains(c));
         let place = image(motion, &p);

@@ -1,4 +1,4 @@
-//! The map of the workspace names files that exist and every equation of the paper.
+//! The map of the workspace names existing files and every equation of the paper.
 use std::path::Path;
 use tactile_imaging::pipeline::Assumption;
 
@@ -11,7 +11,7 @@ fn every_path_of_the_map_exists() {
         (text.contains('/') || text.ends_with(".md")) && !text.contains(char::is_whitespace)
     };
     let paths: Vec<&str> = quoted.filter(is_path).collect();
-    // A map that lost its backticks would name nothing.
+    // Without its backticks the map would name no files.
     assert!(paths.len() > 40, "{} paths", paths.len());
     let missing: Vec<_> = paths.iter().filter(|p| !root.join(p).exists()).collect();
     assert!(missing.is_empty(), "{missing:#?}");
@@ -37,7 +37,7 @@ fn every_equation_of_the_paper_has_its_file() {
     assert_eq!(found, (1..=31).collect::<Vec<_>>());
 }
 
-/// The documentation of scene files states every error that is assumed, with its default.
+/// The documentation of scene files lists every assumed error with its default.
 #[test]
 fn every_assumption_is_documented_with_its_default() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));

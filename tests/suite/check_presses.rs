@@ -1,12 +1,12 @@
-//! Presses of known force: what an object reflects and what the lamps give then needs no
-//! assumption.
+//! Presses of known force, which replace the assumptions on the reflectance of the object and on
+//! the lamps.
 use crate::common::{press_of, trial};
 use ndarray::Array2;
 use tactile_imaging::force::{Estimate, Source};
 use tactile_imaging::pipeline::{CheckPress, CheckedObject, Measurement};
 use tactile_simulate::{Camera, Trial};
 
-/// A press with 0.7, 1.2 and, for the check, 1 N. With a factor that its light has.
+/// A press with 0.7 and 1.2 N and, for the check, 1 N. Its light is multiplied by a factor.
 fn press(seed: u64, light: f64) -> (Trial, Vec<Array2<u8>>) {
     let trial = trial(Camera::default().coarser(4), &[0.7, 1.2, 1.0], seed);
     let reference = &trial.simulation.reference;
@@ -22,7 +22,7 @@ fn press(seed: u64, light: f64) -> (Trial, Vec<Array2<u8>>) {
     (trial, frames)
 }
 
-/// Measures the first two frames. The third is the check, of a weight known to 0.2 %.
+/// Measures the first two frames. The third is the check, with a weight known to 0.2 %.
 fn measured(trial: &Trial, frames: &[Array2<u8>], object: Option<CheckedObject>) -> Measurement {
     let mut pipeline = trial.pipeline().unwrap();
     pipeline = pipeline
@@ -52,7 +52,7 @@ fn a_press_of_the_sample_under_a_weight_makes_its_modulus_right() {
         let modulus = found.youngs_modulus_pa.unwrap();
         let (low, high) = (modulus.interval_95.0, modulus.interval_95.1.unwrap());
         assert!(low < truth && truth < high, "light {light}: {modulus}");
-        // Without the check the coupling alone is known to 6 %.
+        // Without the check the coupling alone has an error of 6 %.
         assert!(
             (high - low) / 2.0 < 0.06 * truth,
             "light {light}: {modulus}"
@@ -60,7 +60,7 @@ fn a_press_of_the_sample_under_a_weight_makes_its_modulus_right() {
     }
 }
 
-/// The lamps are known then, the object's own coupling is not.
+/// The lamps are then known, but not the coupling of the object.
 #[test]
 fn a_press_of_the_calibrator_leaves_the_coupling_open() {
     let (trial, frames) = press(6, 0.8);

@@ -1,9 +1,9 @@
-//! No circles of files: what a file uses does not use it, by whatever way.
+//! No circular use of files: a file does not use itself through the files that it uses.
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Circles that are still there, each by its files. The list only becomes shorter.
+/// Circles that still exist, each as its files. The list may only become shorter.
 const LEFT: &[&str] = &[];
 
 /// A path of modules below the root of a crate.
@@ -73,7 +73,7 @@ fn module(path: &str) -> Module {
         .collect()
 }
 
-/// Which files of a crate use which.
+/// The files of a crate that each file uses.
 struct Uses(BTreeMap<Module, BTreeSet<Module>>);
 
 impl Uses {
@@ -116,7 +116,7 @@ impl Uses {
                 (module, absolute.collect())
             })
             .collect();
-        // A name that a file has from elsewhere.
+        // A name that a file imports from elsewhere.
         let mut elsewhere = BTreeMap::new();
         for (module, paths) in &paths {
             for (_, path) in paths {
@@ -126,7 +126,7 @@ impl Uses {
             }
         }
         let file_of = |mut path: Module| -> Module {
-            // A name goes through few re-exports. One that its file has from itself ends here.
+            // A name passes through few re-exports. A name that its file defines ends here.
             for _ in 0..8 {
                 let file = (0..=path.len())
                     .rev()
@@ -150,8 +150,8 @@ impl Uses {
             let files = paths
                 .iter()
                 .map(|(visible, path)| (visible, file_of(path.clone())));
-            // A folder and what it holds are one thing: what it shows of its files it does not use,
-            // and they may use what it holds itself.
+            // A folder and its contents count as one: it does not use its files by re-exporting
+            // them, and they may use its own items.
             let counts = files.filter(|(visible, file)| {
                 let shows = **visible && file.starts_with(module);
                 texts.contains_key(file) && !shows && !module.starts_with(file)
@@ -161,7 +161,7 @@ impl Uses {
         Self(uses.collect())
     }
 
-    /// Everything that can be reached from a file.
+    /// All files that can be reached from a file.
     fn reached(&self, from: &Module) -> BTreeSet<&Module> {
         let mut reached = BTreeSet::new();
         let mut next: Vec<&Module> = self.0[from].iter().collect();
@@ -188,7 +188,7 @@ impl Uses {
     }
 }
 
-/// The paths of all `use` lines before a file's tests, and whether others see them.
+/// The paths of all `use` lines before the tests of a file, and whether they are public.
 fn used_paths(text: &str) -> Vec<(bool, Module)> {
     let code: Vec<&str> = (text.split("#[cfg(test)]\nmod ").next().unwrap_or_default())
         .lines()
@@ -248,7 +248,7 @@ fn expand(before: &[String], tree: &str, paths: &mut Vec<Module>) {
     }
 }
 
-/// A path from the root of the crate. None of another crate's.
+/// A path from the root of the crate. `None` for another crate.
 fn absolute(module: &Module, path: Module, texts: &BTreeMap<Module, String>) -> Option<Module> {
     let mut names = path.into_iter().peekable();
     let mut base = match names.peek()?.as_str() {

@@ -1,5 +1,5 @@
-//! What many tests begin with (a simulated press, a press of given frames) and end with (errors of
-//! many moduli).
+//! Code shared by many tests: a simulated press, a press of given frames, and the errors of many
+//! moduli.
 #![allow(clippy::print_stdout)]
 use ndarray::{Array2, ArrayView2};
 use tactile_imaging::Pipeline;
@@ -18,7 +18,7 @@ pub(crate) fn trial(camera: Camera, forces_n: &[f64], seed: u64) -> Trial {
     Trial::new(options, &CalibrationRun::default()).expect("a trial")
 }
 
-/// A press of these frames, which it keeps.
+/// A press that owns these frames.
 pub(crate) fn press_of(
     pipeline: &Pipeline,
     reference: ArrayView2<'_, u8>,
@@ -31,11 +31,11 @@ pub(crate) fn press_of(
     press
 }
 
-/// Relative errors of many moduli, and the part of the intervals that hold the truth.
+/// Relative errors of many moduli, and the fraction of intervals that contain the true value.
 #[derive(Debug, Default)]
 pub(crate) struct Study {
     pub(crate) errors: Vec<f64>,
-    /// Standard errors, relative to the truth.
+    /// Standard errors, relative to the true value.
     stated: Vec<f64>,
     held: usize,
 }
@@ -47,7 +47,7 @@ impl Study {
         self.held += usize::from(found.interval_95.contains(truth_pa));
     }
 
-    /// The median and the worst size of an error; NaN without any.
+    /// The median and the largest magnitude of an error, or NaN without errors.
     pub(crate) fn median_and_worst(&self) -> [f64; 2] {
         let mut sizes: Vec<f64> = self.errors.iter().map(|e| e.abs()).collect();
         sizes.sort_by(f64::total_cmp);
@@ -73,7 +73,7 @@ impl Study {
         );
     }
 
-    /// 92 to 98 %, widened by two binomial standard deviations of so many.
+    /// 92 to 98 %, extended by two binomial standard deviations for this number of moduli.
     pub(crate) fn check_coverage(&self) {
         let slack = 2.0 * (0.05 * 0.95 / self.errors.len() as f64).sqrt();
         let range = 0.92 - slack..=0.98 + slack;

@@ -1,5 +1,5 @@
-//! A calibration of few pairs with a noisy gauge: the intervals of force and modulus hold as often
-//! as they promise.
+//! A calibration with few pairs and a noisy gauge: the intervals of force and modulus have their
+//! nominal coverage.
 #![allow(clippy::print_stdout)]
 
 use crate::common::trial;
@@ -9,14 +9,13 @@ use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::PipelineError;
 use tactile_simulate::{Camera, Trial};
 
-/// Noise of the gauge, of its 1.5 N or of its reading.
+/// Noise of the gauge, relative to its 1.5 N or to its reading.
 const GAUGE: f64 = 0.02;
 
-/// Draws for each number of pairs: a coverage of 95 % is then known to 0.8 % (one standard
-/// deviation).
+/// Draws per number of pairs: a coverage of 95 % then has a standard deviation of 0.8 %.
 const DRAWS: usize = 800;
 
-/// Forces of both loads, and the modulus with the interval's lower end and its upper end.
+/// Forces of both loads, and the modulus with the lower and the upper end of its interval.
 fn measure(trial: &Trial) -> Result<Vec<(f64, f64, f64)>, PipelineError> {
     let pipeline = trial.pipeline()?;
     let press = trial.press(&pipeline)?;
@@ -34,11 +33,12 @@ fn measure(trial: &Trial) -> Result<Vec<(f64, f64, f64)>, PipelineError> {
     Ok(found)
 }
 
-/// Only the pairs are drawn anew: the truth is what the same frames give with pairs free of noise.
+/// Only the pairs are drawn anew: the true value is the result of the same frames with noise-free
+/// pairs.
 #[test]
 fn intervals_from_few_pairs_hold() {
     let mut trial = trial(Camera::default().coarser(8), &[0.7, 1.2], 1);
-    // Light per newton, from the calibration that came with the scene.
+    // Light per newton, from the calibration of the scene.
     let greatest = |of: fn(&CalibrationPair) -> f64| trial.pairs.iter().map(of).fold(0.0, f64::max);
     let per_newton = greatest(|pair| pair.integrated_pixel_value) / greatest(|pair| pair.force_n);
     let mut rng = ChaCha8Rng::seed_from_u64(5);
@@ -67,8 +67,8 @@ fn intervals_from_few_pairs_hold() {
         for (share, of) in held.zip(["0.7 N", "1.2 N", "the modulus"]) {
             let case = format!("{count} pairs, noise of the reading {of_reading}, {of}: {share}");
             println!("{case}");
-            // 92 to 98 %, and what 800 draws leave open. Errors of few degrees of freedom beside
-            // known ones make the modulus' interval a little too wide.
+            // 92 to 98 %, extended for 800 draws. Errors with few degrees of freedom in addition to
+            // known ones make the interval of the modulus slightly too wide.
             let most = if of == "the modulus" { 0.995 } else { 0.985 };
             assert!((0.91..=most).contains(&share), "{case}");
         }

@@ -1,10 +1,11 @@
-//! Frames rendered from finite-element contacts, measured blindly: the modulus and its interval.
+//! Frames rendered from finite-element contacts and measured without knowledge of the truth: the
+//! modulus and its interval.
 //!
-//! `tests/data/finite_element_presses.csv` holds contacts computed by the crate's own finite
-//! elements (neo-Hookean, ν = 0.4999, no friction), of moduli, radii, guides and loads that the
-//! layered law was not fitted to and that no table holds; `examples/contact_states.rs` makes it.
-//! `tests/data/calculix_presses.csv` holds those of another program; `evidence/ball_presses.py`
-//! makes it.
+//! `tests/data/finite_element_presses.csv` contains contacts computed by the finite elements of
+//! this project (neo-Hookean, ν = 0.4999, no friction). Their moduli, radii, guides and loads were
+//! not used for the fit of the layered law and are in no table. The file is written by
+//! `examples/contact_states.rs`. `tests/data/calculix_presses.csv` contains contacts of another
+//! program and is written by `evidence/ball_presses.py`.
 mod calculix;
 mod solved;
 
@@ -29,12 +30,12 @@ pub(crate) struct Ball {
     name: String,
     pub(crate) youngs_modulus_pa: f64,
     pub(crate) radius_m: f64,
-    /// Thickness and modulus of each layer; none on a rigid flat.
+    /// Thickness and modulus of each layer. Empty for a rigid flat.
     layers: Vec<(f64, f64)>,
     pub(crate) states: Vec<ContactState>,
 }
 
-/// Contacts as `cargo run --example contact_states -- presses` writes them.
+/// Contacts in the format of `cargo run --example contact_states -- presses`.
 pub(crate) fn recorded_balls() -> Vec<Ball> {
     balls_of("finite_element_presses.csv")
 }
@@ -88,7 +89,7 @@ fn camera(pixel_m: f64) -> Camera {
     }
 }
 
-/// What one pair of loads of a ball is read as.
+/// Result of one pair of loads of a ball.
 struct Reading {
     ball: String,
     largest_ratio: f64,
@@ -100,7 +101,7 @@ struct Reading {
     radius_errors: [f64; 2],
 }
 
-/// Layers of ν = ½ by thickness and modulus; none is a rigid flat.
+/// Layers of ν = ½ by thickness and modulus. An empty list is a rigid flat.
 fn guide(layers: &[(f64, f64)]) -> Guide {
     if layers.is_empty() {
         return Guide::rigid();
@@ -148,11 +149,11 @@ impl Ball {
         }
     }
 
-    /// Two neighbouring loads, drawn with the camera's noise and measured.
+    /// Two neighbouring loads, rendered with the noise of the camera and measured.
     fn read(&self, first: usize, seed: u64, tables: &[Arc<ContactTable>]) -> Reading {
         let pair = &self.states[first..first + 2];
-        // The camera stands so far away that contacts, the calibration's too, take half of the
-        // frame at most.
+        // The distance of the camera is such that contacts, including those of the calibration,
+        // cover at most half of the frame.
         let largest_m = self.states.last().map_or(0.0, |s| s.contact_radius_m);
         let camera = camera(43.1e-6 * (largest_m / 5e-3).max(1.0));
         let options = self.options(pair, camera, seed);
@@ -162,15 +163,15 @@ impl Ball {
                 material: Elastic::RIGID,
             },
             largest_force_n: 1.2 * pair[1].force_n,
-            // A gauge that suits the range, which loads between a hundredth of a newton and a
-            // hundred have.
+            // A gauge with a suitable range: loads are between a hundredth of a newton and a
+            // hundred newtons.
             gauge_noise_n: 1e-3 * pair[1].force_n,
             ..CalibrationRun::default()
         };
         let trial = Trial::new(options, &calibration).unwrap();
         let size = trial.simulation.pixel_size_m;
-        // The rigid ball that calibrates leaves no contact on a rigid flat: there the light of a
-        // pascal is given.
+        // The rigid ball of the calibration has no contact with a rigid flat. In this case the
+        // light per pascal is given.
         let grey_per_newton = trial.scene.truth(0).grey_per_pascal / (size[0] * size[1]);
         let known = |k: u8| {
             let force_n = 0.15 * f64::from(k) * pair[1].force_n;
@@ -186,7 +187,7 @@ impl Ball {
             if !self.layers.is_empty() {
                 settings.waveguide = Some(guide.clone());
             }
-            // All is as it is stated.
+            // All values are as stated.
             settings.state_exact();
         });
         let pipeline = pipeline.unwrap();
@@ -197,7 +198,7 @@ impl Ball {
             let contact = press.contact(frame).unwrap().unwrap();
             contact.contact_radius_m.value / pair[frame].contact_radius_m - 1.0
         });
-        // A table refuses any ball and guide but its own.
+        // A table accepts only its own ball and guide.
         let own_table = tables.iter().find_map(|table| {
             TabulatedContact::new(Arc::clone(table), self.radius_m, 0.5, &guide).ok()
         });
@@ -224,16 +225,16 @@ fn error(estimate: &ModulusEstimate, truth_pa: f64) -> f64 {
     estimate.youngs_modulus_pa / truth_pa - 1.0
 }
 
-/// Errors no larger than these, and intervals that hold.
+/// Checks that errors are within these bounds and that intervals have their coverage.
 fn check(study: &Study, median: f64, worst: f64) {
     let found = study.median_and_worst();
     assert!(found[0] < median && found[1] < worst, "{found:?}");
-    // Three standard deviations of a true 92 % of so many.
+    // Three standard deviations of a true coverage of 92 % for this number of errors.
     let slack = 3.0 * (0.92 * 0.08 / study.errors.len() as f64).sqrt();
     assert!(study.held() > 0.92 - slack, "{study:?}");
 }
 
-/// Prints every reading beside what layers in series give, then the errors of both laws.
+/// Prints every reading and that of layers in series, then the errors of both laws.
 #[allow(clippy::print_stdout)]
 fn studies(readings: &[Reading]) -> [Study; 2] {
     let [mut layered, mut tabulated] = [Study::default(), Study::default()];
@@ -266,7 +267,7 @@ fn studies(readings: &[Reading]) -> [Study; 2] {
     [layered, tabulated]
 }
 
-/// One pair of loads a ball; with `ALL_LOADS` set, every pair, for `.ci/run studies`.
+/// One pair of loads per ball. With `ALL_LOADS` every pair is measured, for `.ci/run studies`.
 #[test]
 fn balls_are_measured_within_their_intervals() {
     let all = std::env::var_os("ALL_LOADS").is_some();
@@ -277,24 +278,24 @@ fn balls_are_measured_within_their_intervals() {
             readings.push(ball.read(first, 1 + 10 * k as u64 + first as u64, &[]));
         }
     }
-    // The best Hertz profile is up to 0.9 % too wide; rounding to grey levels and the lens's blur
-    // leave some hundredths of a per cent.
+    // The best Hertz profile is up to 0.9 % too wide. Rounding to grey levels and the blur of the
+    // lens contribute some hundredths of a per cent.
     let radius = (readings.iter().flat_map(|r| r.radius_errors))
         .fold(0.0, |worst: f64, e| worst.max(e.abs()));
     assert!(radius < 2e-3, "{radius}");
-    // As near as a contact table is to come; measured 0.4 and 1.9 %.
+    // The required accuracy of a contact table. Measured: 0.4 and 1.9 %.
     check(&studies(&readings)[0], 0.01, 0.04);
 }
 
-/// Random balls solved anew, on other meshes than the tables', against tables solved here: minutes,
-/// for `.ci/run studies`.
+/// Random balls solved on other meshes than those of the tables, against tables solved here. It
+/// takes minutes, for `.ci/run studies`.
 #[test]
 fn study_of_solved_presses() {
     let count = test_support::draws("PRESSES", 0);
     if count == 0 {
         return; // a study, not a test
     }
-    // `WITHOUT_TABLES=1` leaves out what takes longest; the layered law is read all the same.
+    // `WITHOUT_TABLES=1` omits the slowest part. The layered law is tested nevertheless.
     let with_tables = std::env::var_os("WITHOUT_TABLES").is_none();
     let sensors = solved::SENSORS.iter().filter(|_| with_tables);
     let tables: Vec<Arc<ContactTable>> = sensors.map(solved::table).collect();
@@ -307,8 +308,8 @@ fn study_of_solved_presses() {
     }
     let [layered, tabulated] = studies(&readings);
     layered.check_coverage();
-    // Where the contact is in the law's range and the camera's noise lets a modulus be known to a
-    // few per cent.
+    // Cases in which the contact is in the range of the law and the noise of the camera allows an
+    // error of the modulus of a few per cent.
     let clear = |r: &&Reading| {
         r.largest_ratio < 1.2 && r.layered.standard_error_pa < 0.03 * r.layered.youngs_modulus_pa
     };
@@ -323,7 +324,7 @@ fn study_of_solved_presses() {
     }
 }
 
-/// Layers that are stated wrong, all by one factor or the touched one alone, checked by balls of
+/// Wrongly stated layers (all by one factor, or only the touched layer), checked with balls of
 /// known modulus.
 #[test]
 fn presses_of_known_balls_make_the_layers_right() {
@@ -347,7 +348,7 @@ fn presses_of_known_balls_make_the_layers_right() {
         let pipeline = Pipeline::from_pairs(&pairs, size, Object::sphere(sample.radius_m)).unwrap();
         let unchecked = pipeline.with_settings(|settings| {
             settings.waveguide = Some(guide(&stated));
-            // Of every layer 10 % of the modulus, by itself.
+            // 10 % of the modulus of each layer, independently.
             let variances = DVector::from_fn(9, |i, _| if i < 3 { 1e-2 } else { 0.0 });
             settings.layer_covariance = Some(DMatrix::from_diagonal(&variances));
             settings.state_exact();
@@ -375,8 +376,8 @@ fn presses_of_known_balls_make_the_layers_right() {
         let errors = [error(&before), error(&after)];
         let half_widths = [half_width(&before), half_width(&after)];
         let case = format!("layers by {top}, {others}: {errors:?} ± {half_widths:?}");
-        // The law's own error, a hundredth at these a/R, bounds what two balls show of three
-        // layers: 4 % beside 8 % or more of the layers as stated.
+        // The error of the law, a hundredth at these a/R, limits the information of two balls on
+        // three layers: 4 % instead of at least 8 % for the layers as stated.
         assert!(half_widths[0] > 0.08 && half_widths[1] < 0.045, "{case}");
         assert!(errors[1].abs() < half_widths[1].min(0.015), "{case}");
         if [*top, *others] != [1.0; 2] {
@@ -404,8 +405,8 @@ impl ContactStage for Known {
     }
 }
 
-/// `PRESSES=48` adds as many balls whose loads, moduli and guides the law's stated error was not
-/// chosen on, in some minutes.
+/// `PRESSES=48` adds 48 balls in some minutes, whose loads, moduli and guides were not used to
+/// choose the stated error of the law.
 #[test]
 fn depressions_of_the_guide_hold_those_of_finite_elements() {
     let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
@@ -427,8 +428,8 @@ fn depressions_of_the_guide_hold_those_of_finite_elements() {
             let contact = ContactReading::new(Some(force), radius);
             let known = pipeline.clone().with_contact(Known(contact));
             let press = press_of(&known, frame.view(), [frame.clone()]);
-            // The axis, and a half and three quarters of the way to the rim, whose place coarse
-            // meshes know to a part of an element.
+            // The axis, and a half and three quarters of the distance to the rim. Coarse meshes
+            // determine the rim to a fraction of an element.
             let rim = state.radius_m.len() - 2;
             let nodes = [0, rim / 2, 3 * rim / 4];
             let distances = nodes.map(|node| state.radius_m[node]);
@@ -437,7 +438,7 @@ fn depressions_of_the_guide_hold_those_of_finite_elements() {
                 let error = (depth.value + state.height_m[node]).abs();
                 held += usize::from(error < 1.96 * depth.standard_error);
                 all += 1;
-                // A law that is wrong in kind is off by more than its error twice over.
+                // A fundamentally wrong law would deviate by more than twice its error.
                 let case = format!("{}: {depth} {error}", ball.name);
                 assert!(error < 4.0 * depth.standard_error, "{case}");
                 assert!(depths[0].relative_error() < 0.09, "{case}");

@@ -1,5 +1,5 @@
-//! Files with a few wrong bytes make no reader panic, nor what their numbers are read for, and what
-//! is written is read back bit for bit.
+//! No reader and no use of its numbers panics on files with a few wrong bytes. Written files are
+//! read back bit for bit.
 
 use crate::corpus::{READERS, inputs};
 use crate::scene_files::{VALID, small_scene};
@@ -13,22 +13,22 @@ use tactile_imaging::force::{
 };
 use tactile_imaging::tps::ThinPlateSpline;
 
-/// A file with this content.
+/// A file with the given content.
 fn file(bytes: &[u8]) -> tempfile::NamedTempFile {
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), bytes).unwrap();
     file
 }
 
-/// One change: what is done, where as a share of the file, and with what.
+/// One edit: the operation, the position as a fraction of the file, and the value.
 type Edit = (u8, f64, u8);
 
-/// Few changes, so that most of the file stays valid and doubling keeps it small.
+/// Few edits, so that most of the file remains valid and duplication keeps it small.
 fn edits() -> impl Strategy<Value = Vec<Edit>> {
     prop::collection::vec((0..12_u8, 0.0..1.0, any::<u8>()), 1..6)
 }
 
-/// Values and words that a field of a table or scene may wrongly hold.
+/// Wrong values and words for a field of a table or scene.
 const FIELDS: [&str; 12] = [
     "",
     "0",
@@ -70,7 +70,7 @@ fn mutated(valid: &[u8], edits: &[Edit]) -> Vec<u8> {
     bytes
 }
 
-/// The line or field around `at`, without the separators that end it.
+/// The line or field around `at`, without the trailing separators.
 fn piece(bytes: &[u8], at: usize, separators: &[u8]) -> std::ops::Range<usize> {
     let ends = |byte: &u8| separators.contains(byte);
     let start = bytes[..at].iter().rposition(ends).map_or(0, |k| k + 1);
@@ -91,7 +91,7 @@ fn columns(bytes: &[u8], [first, second]: [(&str, &str); 2]) -> Option<[Vec<f64>
     read_columns(file(bytes).path(), wanted).ok()
 }
 
-/// A spline's and a calibration's answer, each of a table with these edits.
+/// The results of a spline and a calibration, each from a table with these edits.
 fn uses_of_tables(edits: &[Edit]) -> [Option<f64>; 2] {
     let spline = || {
         let sources = read_points::<2>(file(&mutated(POINTS, edits)).path()).ok()?;
@@ -111,7 +111,8 @@ fn uses_of_tables(edits: &[Edit]) -> [Option<f64>; 2] {
 }
 
 proptest! {
-    /// Random bytes end at a parser's door; a kept input with a few edits comes further in.
+    /// Random bytes fail at the start of a parser. A kept input with a few edits reaches its later
+    /// stages.
     #[test]
     fn inputs_with_edits_end_as_they_should(edits in edits(), which in 0.0..1.0) {
         for (folder, check) in READERS {
@@ -140,7 +141,7 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// A scene whose files are there, one of them damaged, is measured or refused with a sentence.
+    /// A scene with existing files, one of them damaged, is measured or refused with a sentence.
     #[test]
     fn scenes_with_their_files(edits in edits(), which in 0..5_usize) {
         let folder = tempfile::tempdir().unwrap();
@@ -156,7 +157,7 @@ proptest! {
         }
     }
 
-    /// Whatever values tables hold, what comes of them is no NaN.
+    /// Whatever the values in tables, no result is NaN.
     #[test]
     fn tables_go_into_what_they_are_read_for(edits in edits()) {
         prop_assert!(uses_of_tables(&[]).iter().all(Option::is_some));

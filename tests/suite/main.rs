@@ -1,4 +1,4 @@
-//! Tests of the facade: one binary, so that everything below it is compiled and linked once.
+//! Tests of the facade, in a single binary, so that all dependencies are compiled and linked once.
 #![allow(missing_docs)]
 
 mod architecture;

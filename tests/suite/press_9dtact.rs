@@ -1,5 +1,5 @@
-//! A real press: the ball of the 9DTact sensor, its contact and its depth against the ball's
-//! geometry.
+//! A real press of the ball of the 9DTact sensor: contact and depth compared with the geometry of
+//! the ball.
 #![allow(clippy::print_stdout)]
 use crate::common::press_of;
 use ndarray::Array2;
@@ -11,8 +11,8 @@ use test_support::published;
 const PIXEL_M: f64 = 0.0510151e-3;
 const BALL_M: f64 = 4.0e-3;
 
-/// The sensor with its makers' table, with the row 0, 0 or without, and its images without and with
-/// the ball.
+/// The sensor with its published table, with the row 0, 0 or without it, and its images without and
+/// with the ball.
 fn sensor(folder: &Path, grey: Grey, zeroed: bool) -> (Pipeline, [Array2<u8>; 2]) {
     let images = ["rectify_crop_ref.png", "rectify_crop_sample.png"].map(|name| {
         let image = read_grey_image(folder.join(name), grey, None);
@@ -44,8 +44,8 @@ fn the_ball_is_found_and_its_depth_is_right() {
     let surface = press.surface(0).unwrap();
     let ball = surface.fit_ball(BALL_M).expect("a ball");
 
-    // The stated circle, centre (243.9, 188.5) px and a = 67.6 px, is the smallest around the
-    // pixels whose mean of the channels is darker by more than 3: the circle of their area has 66.6
+    // The stated circle, centre (243.9, 188.5) px and a = 67.6 px, is the smallest circle around
+    // the pixels whose channel mean is darker by more than 3. The circle of the same area has 66.6
     // px.
     let centroid_px = reading.centroid_px.map(|c| c.value);
     for centre_px in [centroid_px, ball.centre_m.map(|m| m / PIXEL_M)] {
@@ -57,8 +57,8 @@ fn the_ball_is_found_and_its_depth_is_right() {
         "contact radius {radius} px"
     );
 
-    // Against the stated cap, over the frame's own contact and all that lies around it. The makers
-    // publish 0.0462 mm.
+    // Compared with the stated cap, over the contact of the frame and its surroundings. The
+    // published value is 0.0462 mm.
     let errors_mm = [stated_cap_error_m(surface), ball.mean_absolute_error_m].map(|m| 1e3 * m);
     println!(
         "mean absolute error in mm against the stated cap and the fitted ball {errors_mm:.4?}"
@@ -70,21 +70,21 @@ fn the_ball_is_found_and_its_depth_is_right() {
     let miss = (indentation - stated).abs();
     assert!(miss < 0.1e-3, "{indentation} against {stated}");
     check_profile(surface);
-    // Where nothing touches there is no contact: the reference against itself.
+    // Without a touching object there is no contact: the reference compared with itself.
     let empty = press_of(&pipeline, reference.view(), [reference.clone()]);
     assert!(empty.contact(0).unwrap().is_none());
 }
 
-/// How far a place in the frame is from the stated centre.
+/// Distance of a position in the frame from the stated centre.
 fn from_centre_px([x, y]: [f64; 2]) -> f64 {
     (x - 243.9).hypot(y - 188.5)
 }
 
-/// What the grey and the zero of the makers' table are worth. The table was made from this very
-/// image, by the mean of the channels and a circle that lost its fractions: with centre (243, 188)
-/// and 67 px each of its depths is a mean of that cap to 0.4 nm. The cap of 67.6 px is 0.051 mm
-/// deeper, which no reading of the table gives back. Its zero does, without any circle: no darkness
-/// is no depth.
+/// Effect of the grey value and of the zero of the published table. The table was made from this
+/// very image, with the mean of the channels and a circle without decimals: with centre (243, 188)
+/// and 67 px, each of its depths is a mean of that cap to 0.4 nm. The cap of 67.6 px is deeper by
+/// 0.051 mm, which no use of the table recovers. Its zero recovers it without a circle: no
+/// darkening is no depth.
 #[test]
 fn the_table_is_read_by_its_own_grey_and_from_no_darkness() {
     let Some(folder) = published("9dtact") else {
@@ -99,7 +99,7 @@ fn the_table_is_read_by_its_own_grey_and_from_no_darkness() {
         .map(|grey| [false, true].map(|zeroed| error_mm(grey, zeroed)));
     for (name, [as_it_stands, zeroed]) in ["Rec. 601", "Rec. 709", "mean"].iter().zip(errors) {
         println!("{name}: {as_it_stands:.4} mm, zeroed {zeroed:.4} mm");
-        // Whatever the grey, the table's own zero is too high and the darkness's is not.
+        // For every grey value, the zero of the table is too high and that of the darkening is not.
         assert!(zeroed < 0.0462 && as_it_stands > 0.051);
     }
     assert!(errors[2][1] < errors[0][1]);
@@ -114,8 +114,8 @@ fn stated_cap_m(r: f64) -> f64 {
     (BALL_M * BALL_M - r * r).sqrt() - (BALL_M * BALL_M - a * a).sqrt()
 }
 
-/// Mean absolute error of the heights over the stated contact circle; where no contact was found
-/// the height is zero.
+/// Mean absolute error of the heights over the stated contact circle. The height is zero at pixels
+/// without contact.
 fn stated_cap_error_m(surface: &ContactSurface) -> f64 {
     let [left, top] = surface.origin_m.map(|m| m / PIXEL_M);
     let (mut sum, mut count) = (0.0, 0.0);
@@ -137,9 +137,8 @@ fn stated_cap_error_m(surface: &ContactSurface) -> f64 {
     sum / count
 }
 
-/// The cap's profile, ring by ring of 10 px, against the stated geometry: within 0.1 mm of 1.98 mm
-/// everywhere. Beyond the stated circle there is no depth, but for the pixel that its outline may
-/// be off by.
+/// The profile of the cap, in rings of 10 px, is within 0.1 mm of the stated geometry with its 1.98
+/// mm. Outside the stated circle there is no depth, with a tolerance of one pixel for the outline.
 fn check_profile(surface: &ContactSurface) {
     let [left, top] = surface.origin_m.map(|m| m / PIXEL_M);
     let mut rings = [[0.0; 2]; 6];

@@ -1,5 +1,5 @@
-//! The tracked particles of a uniaxially stretched volume, matched, splined and strained: mean and
-//! local strain against the exact stretch.
+//! The tracked particles of a uniaxially stretched volume: matching, spline and strain. Mean and
+//! local strain are compared with the exact stretch.
 #![allow(clippy::print_stdout)]
 
 use nalgebra::{Matrix3, Point, Point3};
@@ -29,7 +29,7 @@ fn particles_of_a_stretched_volume_have_their_local_strain() {
         let local = (squares.sum::<f64>() / found.strains.len() as f64).sqrt();
         let (pairs, errors) = (found.pairs.len(), found.standard_error.amax());
         println!("0 -> {k}: {pairs} pairs, errors {errors:.1e}, local rms {local:.1e}");
-        // Three standard errors of the mean, which are small themselves.
+        // Three standard errors of the mean, which must be small.
         assert!(gap.amax() < 3.0 * errors && errors < 1e-3, "{gap}");
         assert!(local < 0.01, "{local}");
     }
@@ -41,7 +41,7 @@ fn exact(stretch: f64) -> f64 {
 }
 
 /// The mean strain along x is that of a stretch, within five standard errors or 0.1 %: with nine
-/// degrees of freedom one of a thousand exceeds that. Returns the error in standard errors.
+/// degrees of freedom, one of a thousand exceeds that. Returns the error in standard errors.
 fn check<const D: usize>(found: &StrainBetween<D>, stretch: f64, scene: &str) -> f64 {
     let error = found.standard_error[(0, 0)];
     let off = found.summary.mean[(0, 0)] - exact(stretch);
@@ -93,17 +93,17 @@ impl Stream {
 }
 
 /// A volume is stretched to three times its length in forty frames. Points leave the field of view,
-/// three in a hundred are missed in a frame, and two in a hundred are none. Every step and every
-/// strain since the first frame is right, and tracks go on after a frame without their point.
+/// three per cent are missed in a frame, and two per cent are spurious. Every step and every strain
+/// since the first frame is correct, and tracks continue after a frame without their point.
 #[test]
 fn a_volume_is_followed_to_three_times_its_length() {
     let mut stream = Stream(11);
-    // Jittered cells: particles that are nearer to each other than that are not told apart.
+    // Jittered cells: closer particles would not be resolved.
     let mut cell = |i: u32| (f64::from(i) + 0.8 * stream.next()) / 6.0;
     let particles: Vec<Point3<f64>> = (0..216)
         .map(|k| Point3::new(cell(k % 6), cell(k / 6 % 6), cell(k / 36)))
         .collect();
-    // As the localisation of the published particles: 0.8 % of the spacing.
+    // The localisation error of the published particles: 0.8 % of the spacing.
     let noise = 0.008 / 6.0;
     let mut frame = |k: usize| {
         let stretch = 1.0 + 0.05 * k as f64;
@@ -135,7 +135,8 @@ fn a_volume_is_followed_to_three_times_its_length() {
         squares += check(&found.total.unwrap(), stretch, &format!("0 -> {k}")).powi(2);
         last = stretch;
     }
-    // Errors since the first frame share the first frame's: their mean square is one of a few.
+    // Errors since the first frame have the error of the first frame in common: their mean square
+    // has few degrees of freedom.
     assert!(squares / 40.0 < 4.0, "{squares}");
     let (mut links, mut wrong, mut resumed) = (0, 0, 0);
     for pair in series.tracks().iter().flat_map(|track| track.windows(2)) {
@@ -148,15 +149,15 @@ fn a_volume_is_followed_to_three_times_its_length() {
     assert!(wrong * 1000 <= links && resumed > 100);
 }
 
-/// Scattered points of a unit cube, other ones for another seed.
+/// Scattered points of a unit cube, different for every seed.
 fn scattered(seed: f64, count: u32) -> Vec<Point3<f64>> {
     let place = |i: u32, k: f64| (f64::from(i) * f64::from(i) * k + seed * f64::from(i)).fract();
     let point = |i| Point3::new(place(i, 0.618), place(i, 0.755), place(i, 0.569));
     (0..count).map(point).collect()
 }
 
-/// Where the sample is stretched by 2.6 to 3 and two thirds of its points have left the field of
-/// view, the strain is exact or refused.
+/// If the sample is stretched by 2.6 to 3 and two thirds of its points have left the field of view,
+/// the strain is exact or refused.
 #[test]
 fn a_large_stretch_is_exact_or_refused() {
     let before = scattered(0.1, 700);
@@ -170,7 +171,7 @@ fn a_large_stretch_is_exact_or_refused() {
             Ok(found) => {
                 let gap = found.summary.mean[(0, 0)] - exact;
                 println!("stretch {stretch}: {gap:+.1e} of {exact}");
-                // Without noise only the smoothing spline's own error is left.
+                // Without noise only the error of the smoothing spline remains.
                 assert!(gap.abs() < 2e-3 * exact, "{gap}");
             }
             Err(error) => println!("stretch {stretch}: {error}"),
@@ -178,7 +179,7 @@ fn a_large_stretch_is_exact_or_refused() {
     }
 }
 
-/// Two sets that have nothing to do with each other have no strain.
+/// Two unrelated sets have no strain.
 #[test]
 fn unrelated_sets_are_refused() {
     let [before, after] = [0.1, 0.37].map(|seed| scattered(seed, 80));
@@ -187,17 +188,17 @@ fn unrelated_sets_are_refused() {
 }
 
 /// Thousands of pairs are fitted patch by patch: mean and local strain are within their errors,
-/// pairs of the wrong point have no weight, and points that the matcher missed are found.
+/// wrong pairs have no weight, and points that the matcher missed are found.
 #[test]
 fn thousands_of_pairs_are_fitted_patch_by_patch() {
-    // Fractions of multiples of irrational numbers: no two points coincide.
+    // Fractional parts of multiples of irrational numbers: no two points coincide.
     let place = |i: u32, k: f64| (f64::from(i) * k.sqrt()).fract();
     let point = |i| Point3::new(place(i, 2.0), place(i, 3.0), place(i, 5.0));
     let before: Vec<_> = (0..2400).map(point).collect();
     let bend =
         |p: &Point3<f64>| Point3::new(p.x + 0.04 * p.x * p.x, p.y + 0.01 * (3.0 * p.z).sin(), p.z);
     let after: Vec<_> = before.iter().map(bend).collect();
-    // Every fiftieth pair has its neighbour's partner, every fortieth is missing.
+    // Every fiftieth pair has the partner of its neighbour, and every fortieth is missing.
     let partner = |i: usize| (i, i + usize::from(i.is_multiple_of(50)));
     let pairs: Vec<_> = (0..2399).filter(|i| i % 40 != 7).map(partner).collect();
     let found = StrainBetween::of_pairs(&before, &after, &pairs, &GreenLagrange).unwrap();
@@ -212,8 +213,7 @@ fn thousands_of_pairs_are_fitted_patch_by_patch() {
         if i != j {
             continue; // the first of them is the outermost corner
         }
-        // The field has no noise. What the pairs do not resolve is in the errors, mostly at
-        // corners.
+        // The field has no noise. Unresolved detail is included in the errors, mostly at corners.
         let limit = 1e-4 + 6.0 * found.standard_errors[k].amax();
         let off = (found.strains[k] - exact(&before[i])).amax();
         assert!(off < limit && limit < 0.05, "{k}: {off}, {limit}");
@@ -223,7 +223,7 @@ fn thousands_of_pairs_are_fitted_patch_by_patch() {
     let centre = Point3::new(0.5, 0.5, 0.5);
     let at = found.at(&[centre], &GreenLagrange).unwrap()[0];
     assert!((at.strain - exact(&centre)).amax() < 1e-5);
-    // A set in a plane of space has no strain across it, and a mirror image none at all.
+    // A plane set in space has no strain across the plane, and a mirror image has none at all.
     let all: Vec<_> = (0..2400).map(|i| (i, i)).collect();
     let doubt = |before: &[Point3<f64>], after: &[Point3<f64>]| {
         let found = StrainBetween::of_pairs(before, after, &all, &GreenLagrange);
@@ -235,8 +235,9 @@ fn thousands_of_pairs_are_fitted_patch_by_patch() {
     assert_eq!(doubt(&before, &mirrored), Some(PairsDoubt::Mirrored));
 }
 
-/// A plane is stretched or moved, and seen through its old window. Points whose partners have left
-/// it are not given to others at its edge: the mean strain is right, and pairs that count are.
+/// A plane is stretched or moved, and seen through the same window. Points whose partners have left
+/// the window are not matched to others at its edge: the mean strain and the pairs with weight are
+/// correct.
 #[test]
 fn points_that_left_a_plane_get_no_partner() {
     let scenes = [(1.05, 0.0), (1.1, 0.0), (1.2, 0.0), (1.0, 0.05)];
@@ -245,7 +246,7 @@ fn points_that_left_a_plane_get_no_partner() {
         let before: Vec<Point<f64, 2>> = (0..1500)
             .map(|_| Point::from([stream.next(), stream.next()]))
             .collect();
-        // As the published particles: 2.5 % of the spacing.
+        // The noise of the published particles: 2.5 % of the spacing.
         let noise = 0.025 / 1500_f64.sqrt();
         let image = |p: &Point<f64, 2>| Point::from([stretch * (p.x - 0.5) + 0.5 + shift, p.y]);
         let seen = before.iter().map(image);
@@ -263,7 +264,7 @@ fn points_that_left_a_plane_get_no_partner() {
             found.is_kept(*k) && (image(a) - b).norm() > 6.0 * noise
         };
         let wrong = (0..found.pairs.len()).filter(is_wrong).count();
-        // Random points that nearly coincide trade places.
+        // Random points that nearly coincide are exchanged.
         assert!(wrong * 500 <= found.pairs.len(), "{scene}: {wrong} wrong");
     }
 }

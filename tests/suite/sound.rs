@@ -1,5 +1,5 @@
-//! What must hold of every press and stream, whatever its frames are: a typed error, a finite
-//! answer, or a flag that says what is wrong; never a panic, never a silent NaN.
+//! Requirements for every press and stream, whatever its frames are: a typed error, a finite
+//! result, or a flag that names the cause; never a panic, never a silent NaN.
 use nalgebra::Point3;
 use ndarray::Array2;
 use std::fmt::Debug;
@@ -13,9 +13,8 @@ fn all_finite<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> bool {
     numbers.into_iter().all(|v| v.is_finite())
 }
 
-/// Whether a contact's numbers that are no numbers are owned up to: by a flag that says what is
-/// wrong with that contact. A flag about the law (a/R beyond Hertz's range stands on most of these
-/// scenes) or about another frame excuses nothing.
+/// Whether a flag about this contact explains its NaN values. A flag about the law (most of these
+/// scenes have an a/R beyond Hertz's range) or about another frame is no explanation.
 fn excuses_contact(flag: &Flag, in_frame: usize) -> bool {
     matches!(flag,
         Flag::Saturated { frame, .. }
@@ -24,7 +23,7 @@ fn excuses_contact(flag: &Flag, in_frame: usize) -> bool {
         | Flag::ProfileNotConverged { frame } if *frame == in_frame)
 }
 
-/// All numbers are numbers, or it is owned up to.
+/// Checks that all numbers are finite, or that a flag explains them.
 fn check(case: &str, numbers: &[f64], excused: bool, of: &dyn Debug) {
     assert!(all_finite(numbers) || excused, "{case}: {of:?}");
 }
@@ -49,13 +48,13 @@ fn contact(case: &str, contact: &ContactReading) {
     check(case, &all, excused, contact);
 }
 
-/// Without a number there is nothing that a broken assumption could be a caution about.
+/// Without a number there can be no caution about a violated assumption.
 fn modulus(case: &str, found: &ModulusEstimate) {
     let numbers = [found.youngs_modulus_pa, found.standard_error_pa];
     check(case, &numbers, false, found);
 }
 
-/// Every stage of a frame on its own, whatever became of the one before.
+/// Every stage of a frame, regardless of the result of the previous stage.
 fn stages(case: &str, press: &Press<'_>, frame: usize) {
     if let Ok(Some(reading)) = press.contact(frame) {
         contact(case, reading);
@@ -118,7 +117,7 @@ fn measured(case: &str, m: &Measurement) {
     }
 }
 
-/// The modulus alone, without surfaces where it can.
+/// Only the modulus, without surfaces if possible.
 pub(crate) fn modulus_alone(case: &str, press: &Press<'_>) {
     if let Ok(found) = press.modulus() {
         modulus(case, &found);
@@ -136,8 +135,8 @@ pub(crate) fn press(case: &str, press: &Press<'_>) -> Measurement {
     all
 }
 
-/// A stream of the same frames, twice, in which no error may stick: a sound frame pushed after an
-/// error is measured as ever.
+/// A stream of the same frames, twice. No error may persist: a valid frame after an error is
+/// measured as usual.
 pub(crate) fn stream(
     case: &str,
     pipeline: &Pipeline,

@@ -1,5 +1,5 @@
-//! Every stated error is true: deviations from the truth over stated standard errors, of all that a
-//! press of a ball by finite elements gives.
+//! Every stated error is correct: deviations from the truth divided by stated standard errors, for
+//! all results of a press of a ball by finite elements.
 #![allow(clippy::print_stdout)]
 
 use tactile_imaging::pipeline::Measurement;
@@ -11,10 +11,10 @@ const QUANTITIES: [&str; 8] = [
     "force", "radius", "stress", "height", "e_xx", "e_yy", "e_zz", "modulus",
 ];
 
-/// Two loads, and how many of the paper's pixels are one.
+/// Two loads, and the factor by which pixels are coarser than those of the paper.
 const PRESSES: [([f64; 2], usize); 3] = [([0.1, 0.3], 1), ([0.3, 0.7], 2), ([0.7, 1.2], 2)];
 
-/// Deviations over standard errors, each with the place of its quantity.
+/// Deviations divided by standard errors, each with the index of its quantity.
 fn deviations(found: &Measurement, made: &PressSimulation) -> Vec<(usize, f64)> {
     let mut all = Vec::new();
     for (frame, truth) in found.frames.iter().zip(&made.truth) {
@@ -44,8 +44,8 @@ fn deviations(found: &Measurement, made: &PressSimulation) -> Vec<(usize, f64)> 
     all
 }
 
-/// A press of the paper's ball, and what is found of it. One of the pixels is `coarser` of the
-/// paper's.
+/// A press of the paper's ball and its measurement. Pixels are coarser than the paper's by the
+/// factor `coarser`.
 fn press(loads_n: [f64; 2], coarser: usize, seed: u64) -> (PressSimulation, Measurement) {
     let options = PressOptions {
         camera: Camera::default().coarser(coarser),
@@ -59,7 +59,7 @@ fn press(loads_n: [f64; 2], coarser: usize, seed: u64) -> (PressSimulation, Meas
     (trial.simulation, found)
 }
 
-/// `SEEDS=40` takes more draws of the noise than one.
+/// `SEEDS=40` repeats the test with forty draws of the noise.
 #[test]
 fn deviations_from_the_truth_are_those_stated() {
     let mut all: [Vec<f64>; QUANTITIES.len()] = Default::default();
@@ -77,12 +77,12 @@ fn deviations_from_the_truth_are_those_stated() {
         let worst = z.iter().fold(0.0, |worst: f64, z| worst.max(z.abs()));
         let held = z.iter().filter(|z| z.abs() < 1.96).count() as f64 / count;
         println!("| {name} | {count} | {rms:.2} | {worst:.2} | {held:.3} |");
-        // Of the 1440 deviations of 40 seeds, 0.7 are expected beyond 3.5.
+        // Of the 1440 deviations of 40 seeds, 0.7 are expected above 3.5.
         assert!(worst < 3.5, "{name}: {z:.2?}");
     }
 }
 
-/// Heights of contacts of 6 to 140 pixels. `SEEDS=6` takes more draws of the noise than one.
+/// Heights of contacts of 6 to 140 pixels. `SEEDS=6` repeats the test with six draws of the noise.
 #[test]
 fn heights_of_small_contacts_have_the_error_they_state() {
     let mut all = Vec::new();
@@ -105,6 +105,6 @@ fn heights_of_small_contacts_have_the_error_they_state() {
     let rms = (all.iter().map(|z| z * z).sum::<f64>() / count).sqrt();
     let held = all.iter().filter(|z| z.abs() < 1.96).count() as f64 / count;
     println!("rms {rms:.2}, {held:.3} held of {count}");
-    // Biases of some sizes repeat in all draws: of 24 contacts one may be out.
+    // The biases of some sizes repeat in all draws: one of 24 contacts may be outside.
     assert!((0.5..1.3).contains(&rms) && held > 0.92, "{rms} {held}");
 }

@@ -1,24 +1,24 @@
-//! Scenes on which a measurement must end with a flag, an error or a value, never a panic.
+//! Scenes on which a measurement must end with a flag, an error or a value, and never a panic.
 
 use ndarray::Array2;
 use tactile_simulate::{
     Gain, Illumination, PressLoad, PressOptions, PressScene, PressSimulation, SimulateError,
 };
 
-/// What is wrong with the scene.
+/// The defect of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Hostile {
-    /// Nothing touches the sensor.
+    /// There is no contact.
     NoiseOnly,
     /// Every pixel of frame and reference is 255.
     AllSaturated,
     /// Every pixel of frame and reference is 0.
     AllBlack,
-    /// The contact alone is saturated.
+    /// Only the contact is saturated.
     SaturatedContact,
-    /// Three contacts in one frame; the truth lists them, largest force first.
+    /// Three contacts in one frame. The truth lists them in the order of decreasing force.
     SeveralContacts,
-    /// Half of the contact lies beyond the frame's left edge.
+    /// Half of the contact lies beyond the left edge of the frame.
     CutByEdge,
     /// Three quarters of the contact lie beyond a corner.
     InCorner,
@@ -26,11 +26,11 @@ pub(crate) enum Hostile {
     SubPixelContact,
     /// The contact is larger than the frame.
     FillsFrame,
-    /// The light has grown 5 % brighter since the reference.
+    /// The light has become 5 % brighter since the reference.
     BrighterLamps,
-    /// The LEDs have moved: 10 % brighter on one side, darker on the other.
+    /// The LEDs have moved: 10 % brighter on one side and darker on the other.
     MovedLamps,
-    /// The object already touched when the reference was taken, and has gone since.
+    /// The object was in contact during the reference, and has been removed since.
     PressedReference,
 }
 
@@ -51,9 +51,8 @@ impl Hostile {
         Self::PressedReference,
     ];
 
-    /// Reference, one frame and truth of the scene on `base` (camera, object, waveguide, seed),
-    /// whose loads, gain and centre are replaced.
-    ///
+    /// Reference, one frame and the truth of the scene, based on `base` (camera, object, waveguide,
+    /// seed). Loads, gain and centre are replaced.
     pub(crate) fn simulate(self, base: &PressOptions) -> Result<PressSimulation, SimulateError> {
         let (options, force_n) = self.options(base)?;
         if self == Self::SeveralContacts {
@@ -71,8 +70,8 @@ impl Hostile {
         Ok(made)
     }
 
-    /// The scene's options, and the force of its common contact: a fifth of the frame's shorter
-    /// side in radius.
+    /// The options of the scene, and the force of its common contact, whose radius is a fifth of
+    /// the shorter side of the frame.
     fn options(self, base: &PressOptions) -> Result<(PressOptions, f64), SimulateError> {
         let camera = base.camera;
         let middle = [camera.shape[1], camera.shape[0]].map(|n| (n as f64 - 1.0) / 2.0);
@@ -110,7 +109,7 @@ impl Hostile {
     }
 }
 
-/// Three contacts of falling force, side by side along a diagonal.
+/// Three contacts of decreasing force along a diagonal.
 fn several(base: &PressOptions, force_n: f64) -> Result<PressSimulation, SimulateError> {
     let [rows, cols] = base.camera.shape.map(|n| n as f64);
     let mut scenes = Vec::new();
@@ -138,8 +137,8 @@ fn several(base: &PressOptions, force_n: f64) -> Result<PressSimulation, Simulat
     })
 }
 
-/// Expected grey levels of the first loads of several scenes seen in one frame: their light above
-/// that of the sensor alone, added up.
+/// Expected grey levels of the first loads of several scenes in one frame: their light above that
+/// of the sensor alone is summed.
 fn superposed(sensor: &PressScene, scenes: &[PressScene]) -> Result<Array2<f64>, SimulateError> {
     let free = PressScene::new(PressOptions {
         loads: vec![PressLoad {

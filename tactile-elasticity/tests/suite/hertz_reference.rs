@@ -22,7 +22,7 @@ fn close(case: &Value, what: &str, found: f64, expected: f64, tolerance: f64) {
     assert!(gap <= tolerance, "{id} {what}: {found:e} for {expected:e}");
 }
 
-/// Each number found against the one of its name.
+/// Compares each number with the expected number of the same name.
 fn all_close(case: &Value, expected: &Value, tolerance: f64, found: &[(&str, f64)]) {
     for (key, found) in found {
         close(case, key, *found, number(&expected[key]), tolerance);
@@ -48,7 +48,7 @@ fn contacts() {
         if case["status"] == "conforming" {
             continue;
         }
-        // 1/R = 1/R₁ + 1/R₂. The sum of the radii is exact where they nearly cancel.
+        // 1/R = 1/R₁ + 1/R₂. The sum of the radii is exact if they nearly cancel.
         let radius = match (optional(&case["R1"]), optional(&case["R2"])) {
             (Some(one), Some(other)) => one / (one + other) * other,
             (one, other) => one.or(other).unwrap(),
@@ -94,7 +94,7 @@ fn inverses() {
             }
             match estimator.estimate(&LoadSeries::new([load])) {
                 Ok(found) => {
-                    // 1/E* − C cancels: the answer's condition is 1/(1 − C E*).
+                    // 1/E* − C cancels: the condition of the result is 1/(1 − C E*).
                     let reduced = number(&expected["E_star"]);
                     let cond = 1.0 / (1.0 - other.compliance_per_pa() * reduced);
                     let tolerance = 1e-12f64.max(100.0 * f64::EPSILON * cond);
@@ -122,8 +122,8 @@ fn surfaces() {
     }
 }
 
-/// The reference of the integral equation is itself good to about 10⁻⁹, its samples are printed
-/// with ten digits.
+/// The reference of the integral equation is itself accurate to about 10⁻⁹, and its samples have
+/// ten printed digits.
 #[test]
 fn layers_solved() {
     for case in of_kind("layer") {

@@ -1,5 +1,5 @@
-//! Rotation, principal strains, change of size and equivalent strain against constructed
-//! deformations, their errors against drawing the gradient anew.
+//! Rotation, principal strains, change of size and equivalent strain, compared with constructed
+//! deformations. Their errors are compared with random draws of the gradient.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -38,7 +38,7 @@ fn a_constructed_deformation_is_taken_apart() {
     }
 }
 
-/// In the plane the sign of a rotation is known, and z takes no part.
+/// In the plane the sign of a rotation is determined, and z has no effect.
 #[test]
 fn the_plane_turns_either_way() {
     for angle in [-1.0_f64, 0.2, 2.5] {
@@ -53,7 +53,7 @@ fn the_plane_turns_either_way() {
     }
 }
 
-/// Incompressible tension along one axis has its own strain for the equivalent.
+/// The equivalent strain of incompressible tension along one axis is the strain of the tension.
 #[test]
 fn equivalent_strain_of_incompressible_tension_is_the_tension() {
     let h = Matrix3::from_diagonal(&Vector3::new(0.02, -0.01, -0.01));
@@ -61,8 +61,8 @@ fn equivalent_strain_of_incompressible_tension_is_the_tension() {
     assert!((found.equivalent - 0.02).abs() < 1e-16);
 }
 
-/// 4000 draws know a standard deviation to 1.1 %. Errors are a hundredth of the strain, where the
-/// first order holds to a few per cent.
+/// 4000 draws determine a standard deviation to 1.1 %. Errors are a hundredth of the strain, for
+/// which the first order is accurate to a few per cent.
 #[test]
 fn errors_are_those_of_gradients_drawn_anew() {
     let h = Matrix3::new(0.05, 0.02, 0.01, -0.03, -0.04, 0.02, 0.0, 0.01, 0.01);
@@ -111,7 +111,7 @@ fn errors_are_those_of_gradients_drawn_anew() {
     }
 }
 
-/// A flat sheet in space: what follows ∂u/∂z is unknown, the rest is not.
+/// A flat sheet in space: results that depend on ∂u/∂z are unknown, and the others are not.
 #[test]
 fn what_follows_an_unknown_derivative_is_unknown() {
     let h = Matrix3::from_diagonal(&Vector3::new(0.02, 0.01, 0.0));

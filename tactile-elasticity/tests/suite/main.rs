@@ -1,5 +1,5 @@
-//! The tests of `tactile-elasticity`, in one program: the generic code is compiled once for all of
-//! them.
+//! The tests of `tactile-elasticity`, in a single program, so that the generic code is compiled
+//! once.
 
 mod common;
 mod hertz_reference;

@@ -1,8 +1,8 @@
-//! Recorded answers: what the crate computed when `tests/recorded.txt` was written, so that a
-//! change of its insides changes no number.
+//! Recorded results of the crate at the time `tests/recorded.txt` was written. They ensure that a
+//! change of the implementation changes no number.
 //!
-//! `RECORD_ANSWERS=1 cargo test -p tactile-elasticity --test suite recorded` writes the file anew;
-//! the reason belongs in the commit.
+//! `RECORD_ANSWERS=1 cargo test -p tactile-elasticity --test suite recorded` rewrites the file.
+//! Give the reason in the commit.
 
 use test_support as record;
 
@@ -14,8 +14,8 @@ use tactile_elasticity::strain::*;
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/recorded.txt");
 
-/// A reordered sum, or another way to the same zero of a function, may move the last digits.
-/// Nothing else may.
+/// A sum in another order, or another method for the same zero of a function, may change the last
+/// digits. Other changes are errors.
 const TOLERANCE: f64 = 1e-12;
 
 /// Names with their numbers.
@@ -138,7 +138,7 @@ fn loads() -> Vec<LoadState> {
 fn estimators(answers: &mut Answers) {
     let (radius, nu, gel) = (4e-3, 0.48, gel());
     let series = LoadSeries::new(loads());
-    // One gauge is behind all forces, and its error was estimated with them.
+    // All forces come from one gauge, and its error was estimated with them.
     let scaled: Vec<_> = (loads().into_iter())
         .map(|mut load| {
             let scale = 0.01 * load.force_n.value;
@@ -189,7 +189,7 @@ fn answers_are_those_recorded() {
     strain_and_stress(&mut answers);
     contacts(&mut answers);
     estimators(&mut answers);
-    // Numbers that are zero but for rounding have no relative error.
+    // Numbers that are zero up to rounding have no relative error.
     answers
         .0
         .check(FILE, |_, recorded, _| TOLERANCE * recorded.abs().max(1e-6));

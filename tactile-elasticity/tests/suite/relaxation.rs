@@ -1,4 +1,4 @@
-//! Moduli over time against solids, drifts and constants whose parameters are known.
+//! Moduli over time, compared with solids, drifts and constants with known parameters.
 #![allow(clippy::print_stdout)]
 
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -25,7 +25,7 @@ impl Solid {
         self.settled_pa + (self.fresh_pa - self.settled_pa) * (-time_s / self.time_constant_s).exp()
     }
 
-    /// 1/E under a force put on at time 0: the deformation that it makes, over the force.
+    /// 1/E under a force applied at time 0: the deformation divided by the force.
     fn compliance(self, time_s: f64) -> f64 {
         let creep_s = self.time_constant_s * self.fresh_pa / self.settled_pa;
         let (last, first) = (1.0 / self.settled_pa, 1.0 / self.fresh_pa);
@@ -36,20 +36,20 @@ impl Solid {
 /// How a sample is loaded.
 #[derive(Clone, Copy, Debug)]
 enum Protocol {
-    /// An approach that is kept: the force falls.
+    /// A constant approach: the force decreases.
     HeldApproach,
     /// A weight: the contact grows.
     HeldForce,
-    /// An approach that is kept against a guide that yields: the contact grows by a sixth while the
-    /// force falls.
+    /// A constant approach on a compliant guide: the contact grows by a sixth while the force
+    /// decreases.
     YieldingApproach,
-    /// A weight put on at once and another at the same rate until the last load: Boltzmann's
-    /// superposition of a step and a ramp.
+    /// A weight applied at time 0, and a second one added at a constant rate until the last load:
+    /// Boltzmann's superposition of a step and a ramp.
     GrowingForce,
 }
 
-/// ∫₀ᵗ kernel(t − s) rate(s) ds by Simpson's rule on a thousand steps: exact to 1e-10 for so smooth
-/// a function.
+/// ∫₀ᵗ kernel(t − s) rate(s) ds by Simpson's rule with a thousand steps: accurate to 1e-10 for such
+/// smooth functions.
 fn superposition(time_s: f64, kernel: impl Fn(f64) -> f64, rate: impl Fn(f64) -> f64) -> f64 {
     let steps = 1000;
     let width = time_s / f64::from(steps);
@@ -98,8 +98,8 @@ fn equal_times(count: usize, last_s: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Moduli with relative errors of their own: of the forces, and of what the deformations are told
-/// from.
+/// Moduli with independent relative errors of the forces and of the quantities that determine the
+/// deformations.
 fn measured(
     times_s: &[f64],
     truth: &[(f64, f64)],
@@ -126,7 +126,7 @@ fn measured(
 
 #[test]
 fn intervals_hold_the_solid() {
-    // Loads, the last one's time, errors of forces and of lengths.
+    // Loads, the time of the last one, errors of forces and of lengths.
     let loads = [
         (5, 6.0, [0.0, 0.005]),
         (12, 8.0, [0.01, 0.0]),
@@ -164,16 +164,16 @@ fn intervals_hold_the_solid() {
         println!(
             "{protocol:?}: told {told}; E0, E and tau held by {shares:.3?} of their intervals"
         );
-        // A fall by a quarter against errors of 1 % and less is told nearly always.
+        // A decrease by a quarter with errors of at most 1 % is nearly always recognised.
         assert!(told >= 3 * SEEDS * 97 / 100, "{protocol:?}: {told}");
-        // 450 intervals: one standard deviation of the share is 1 %.
+        // 450 intervals: one standard deviation of the fraction is 1 %.
         for share in shares {
             assert!((0.92..=0.985).contains(&share), "{protocol:?}: {shares:?}");
         }
     }
 }
 
-/// Of how many series each is told: steady, relaxing, drifting, undecided.
+/// Number of series with each result: steady, relaxing, drifting, undecided.
 fn counted(
     times_s: &[f64],
     truth: impl Fn(f64) -> (f64, f64),
@@ -202,7 +202,7 @@ fn false_alarms_are_one_in_a_hundred() {
         let counts = counted(&times, |_| (0.7, 100e3), 0.0, seeds);
         let alarms = (seeds - counts[0]) as f64 / seeds as f64;
         println!("{count} loads: steady, relaxing, drifting, undecided {counts:?}");
-        // 1 %, and three standard deviations of so many tries.
+        // 1 %, and three standard deviations for this number of attempts.
         let allowed = 0.01 + 3.0 * (0.01 * 0.99 / seeds as f64).sqrt();
         assert!(alarms <= allowed, "{count} loads: {counts:?}");
     }
@@ -213,7 +213,7 @@ fn a_rising_gain_is_a_drift_and_a_falling_one_is_no_solid() {
     let gain = |per_s: f64| move |t: f64| (0.7 * (1.0 + per_s * t), 100e3 * (1.0 + per_s * t));
     for count in [5, 40] {
         let times = equal_times(count, 10.0);
-        // 10 % up, 20 % down, at errors of 1 %.
+        // 10 % up and 20 % down, with errors of 1 %.
         let up = counted(&times, gain(0.01), 0.0, 200);
         let down = counted(&times, gain(-0.02), 0.0, 200);
         assert_eq!(up, [0, 0, 200, 0], "{count} loads");
@@ -244,7 +244,7 @@ fn a_time_constant_beyond_the_loads_is_not_told() {
 
 #[test]
 fn a_law_that_errs_with_the_load_is_not_mistaken_for_time() {
-    // E grows by 3 % where the load grows by e, and the load with time.
+    // E grows by 3 % if the load grows by a factor of e, and the load grows with time.
     let truth = |t: f64| {
         let force: f64 = 0.2 + 0.1 * t;
         (force, 100e3 * force.powf(0.03))
@@ -261,7 +261,7 @@ fn scatter_beyond_the_errors_is_no_change() {
     let times = equal_times(20, 10.0);
     let mut alarms = 0;
     for seed in 0..400 {
-        // Errors stated three times too small.
+        // The stated errors are three times too small.
         let mut series = measured(&times, &[(0.7, 100e3); 20], [0.0, 0.03], seed);
         for load in &mut series {
             load.youngs_modulus_pa.standard_error /= 3.0;
@@ -269,8 +269,8 @@ fn scatter_beyond_the_errors_is_no_change() {
         let told = time_dependence(&series, 0.0, 0.0).unwrap();
         alarms += usize::from(told != TimeDependence::Steady);
     }
-    // The scatter is learnt from the same 20 loads, so that more than 1 % are expected; without the
-    // scaling it is nine of ten.
+    // The scatter is estimated from the same 20 loads, so that more than 1 % are expected. Without
+    // the scaling it is nine of ten.
     println!("{alarms} alarms of 400");
     assert!(alarms <= 20, "{alarms}");
 }
@@ -288,7 +288,7 @@ fn what_all_loads_share_widens_the_moduli_alone() {
     };
     let (own, shared) = (solid(0.0), solid(0.05));
     assert_eq!(own.time_constant_95_s, shared.time_constant_95_s);
-    // 5 % of standard error is 9.8 % on either side at least.
+    // A standard error of 5 % is at least 9.8 % on either side.
     assert!(shared.equilibrium_95_pa.lower < 0.907 * shared.equilibrium_pa);
     assert!(shared.instantaneous_95_pa.upper.unwrap() > 1.1 * shared.instantaneous_pa);
 }
@@ -325,8 +325,8 @@ fn what_is_no_series_is_refused() {
     assert_eq!(at_once, Ok(TimeDependence::Steady));
 }
 
-/// Four loads under one force tell no time constant, but how much the sample has softened: a
-/// compliance that grows by 15 %.
+/// Four loads under one force do not determine a time constant, but they determine how much the
+/// sample has softened: the compliance grows by 15 %.
 #[test]
 fn few_loads_under_a_held_force_tell_the_change() {
     let series: Vec<TimedModulus> = (0..4)
@@ -341,7 +341,7 @@ fn few_loads_under_a_held_force_tell_the_change() {
         .collect();
     match time_dependence(&series, 0.0, 0.0).unwrap() {
         TimeDependence::Undecided { change } => {
-            // The compliances lie on a line, which is fitted to them: rounding.
+            // The compliances lie on the fitted line: rounding.
             assert!((change - (1.0 / 1.15 - 1.0)).abs() < 1e-9, "{change}");
         }
         other => panic!("{other:?}"),

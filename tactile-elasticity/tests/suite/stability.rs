@@ -1,4 +1,4 @@
-//! Little strain under much rotation, all scales, both precisions, folding, robustness and no
+//! Small strain with large rotation, all scales, both precisions, folding, robustness, and no
 //! allocation.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -34,8 +34,8 @@ fn gradient(size: f64) -> impl Strategy<Value = Matrix3<f64>> {
 }
 
 proptest! {
-    /// Turning the whole does not strain it; F = Q(I + H) is rounded to 10⁻¹⁶, and so is the
-    /// strain, absolutely.
+    /// A rotation of the whole body is no strain. F = Q(I + H) is rounded to 10⁻¹⁶, which is also
+    /// the absolute error of the strain.
     #[test]
     fn rotations_do_not_strain(q in rotation(), h in gradient(0.2)) {
         let f = Matrix3::identity() + h;
@@ -44,25 +44,25 @@ proptest! {
             let gap = (measure.of(&still).unwrap() - measure.of(&turned).unwrap()).amax();
             prop_assert!(gap < 4e-15, "{} {gap:e}", measure.name());
         }
-        // Euler-Almansi turns with the body.
+        // Euler–Almansi strain rotates with the body.
         let [still, turned] = [still, turned].map(|of| EulerAlmansi.of(&of).unwrap());
         prop_assert!((turned - q * still * q.transpose()).amax() < 1e-14);
     }
 
-    /// All measures agree to first order, from strains of 10⁻⁹⁰ up.
+    /// All measures agree to first order, from strains of 10⁻⁹⁰.
     #[test]
     fn measures_agree_where_strain_is_tiny(h in gradient(1.0), exponent in -90i32..-9) {
         let scale = 10f64.powi(exponent);
         let h = h * scale;
         let linear = Infinitesimal.strain(&h).unwrap();
         for measure in measures() {
-            // They differ by H², a share of the scale itself, and by rounding.
+            // They differ by H², a fraction of the scale itself, and by rounding.
             let gap = (measure.strain(&h).unwrap() - linear).amax() / scale;
             prop_assert!(gap < 20.0 * scale + 1e-14, "{} {gap:e}", measure.name());
         }
     }
 
-    /// tr ln U = ln J, and the principal stretches multiply to J.
+    /// tr ln U = ln J, and the product of the principal stretches is J.
     #[test]
     fn logarithms_add_up_to_the_volume(h in gradient(0.3)) {
         let d = Deformation::from_displacement_gradient(h);
@@ -72,8 +72,8 @@ proptest! {
         prop_assert!((product / d.jacobian() - 1.0).abs() < 1e-14);
     }
 
-    /// A rotation rounded to 2⁻²⁰ changes the volume by some 1e-6, which integers give exactly.
-    /// What it is summed from is as large as one: in working precision six digits would be lost.
+    /// A rotation rounded to 2⁻²⁰ changes the volume by about 1e-6, which integers represent
+    /// exactly. The summands are as large as one: working precision would lose six digits.
     #[test]
     fn the_volume_change_of_a_rotation_keeps_its_digits(q in rotation()) {
         let whole = (q - Matrix3::identity()).map(|x| (x * f64::from(1 << 20)).round() as i128);
@@ -160,8 +160,8 @@ fn weights_are_areas() {
     assert!((field.summary().mean[(1, 1)] - 0.01f64).abs() < 1e-17);
 }
 
-/// A small turn in each plane, of numbers whose strain is exact: E is 2⁻⁴³ where the terms it is
-/// summed from are 2⁻²¹ and need 81 bits.
+/// A small rotation in each plane, with numbers whose strain is exact: E is 2⁻⁴³, whereas its terms
+/// are 2⁻²¹ and need 81 bits.
 #[test]
 fn what_a_turn_leaves_keeps_all_its_digits_in_every_plane() {
     let power = |k: i32| 2.0_f64.powi(k);
@@ -172,7 +172,7 @@ fn what_a_turn_leaves_keeps_all_its_digits_in_every_plane() {
         (h[(i, j)], h[(j, i)]) = (-turn, turn);
         (h[(i, i)], h[(j, j)]) = (along, along);
         let strain = GreenLagrange.strain(&h).unwrap();
-        // along + ½ (along² + turn²), in full 2⁻⁴³ + 2⁻⁷¹ + 2⁻⁸¹ + 2⁻¹⁰¹; the last is half a
+        // along + ½ (along² + turn²) is exactly 2⁻⁴³ + 2⁻⁷¹ + 2⁻⁸¹ + 2⁻¹⁰¹. The last term is half a
         // rounding.
         let expected = power(-43) + power(-71) + power(-81);
         for k in [i, j] {

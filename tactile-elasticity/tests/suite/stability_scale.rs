@@ -1,5 +1,5 @@
-//! Tiny strain under large rotation, nearly singular deformations, contacts of every size, against
-//! 80-digit numbers.
+//! Small strain under large rotation, nearly singular deformations and contacts of every size,
+//! compared with 80-digit numbers.
 #![allow(clippy::print_stdout)]
 
 use test_support as worst;
@@ -17,7 +17,7 @@ fn matrix(value: &Value) -> Matrix3<f64> {
     Matrix3::from_fn(|i, j| rows[i][j])
 }
 
-/// Relative to the largest entry of the strain, however small: a dozen roundings in twofold
+/// Relative to the largest entry of the strain, however small: a dozen roundings of twofold
 /// arithmetic or of single products.
 const ALLOWED: f64 = 50.0;
 
@@ -57,7 +57,7 @@ fn strains_have_all_their_digits() {
     table.finish();
 }
 
-/// Products and roots: each result follows its inputs with exponents below one.
+/// Products and roots: each result depends on its inputs with exponents below one.
 fn hertz(table: &mut Worst) {
     for case in cases(include_str!("../reference/hertz.json")) {
         let at = |key: &str| case[key].as_f64().unwrap();

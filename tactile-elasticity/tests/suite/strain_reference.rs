@@ -1,5 +1,5 @@
-//! Every case of the strain reference (90-digit arithmetic), 10⁻¹² where cond F ≤ 10², else 100 ε
-//! cond F.
+//! Every case of the strain reference (90-digit arithmetic), to 10⁻¹² if cond F ≤ 10² and to 100 ε
+//! cond F otherwise.
 
 use crate::common::{number, reference};
 use nalgebra::Matrix3;
@@ -69,8 +69,7 @@ fn every_measure_and_scalar_of_every_case() {
             (third, &stretches[2]),
         ] {
             let Some(e) = expected.as_f64() else { continue };
-            // A zero of the reference is a zero of the mathematics; rounding may leave an ulp of
-            // one.
+            // A zero of the reference is an exact zero. Rounding may leave an ulp of one.
             let gap = (found - e).abs() / if e == 0.0 { 1.0 } else { e.abs() };
             assert!(gap <= tol, "{id}: {found:e} for {e:e}");
         }

@@ -1,4 +1,4 @@
-//! Every rejected value is one error, and nothing panics.
+//! Every invalid value gives an error, and no call panics.
 
 use ndarray::Array2;
 use proptest::prelude::*;
@@ -140,8 +140,8 @@ fn shear_pairs_that_say_nothing() {
     ));
 }
 
-/// Blocks, noise, edges, single pixels, full scale, whatever comes: a measurement with a finite
-/// force, or a refusal of what is saturated.
+/// Blocks, noise, edges, single pixels, full scale: each frame gives a measurement with a finite
+/// force, or is refused because of saturation.
 fn end_civilly(
     (rows, columns): (usize, usize),
     seed: u64,
@@ -174,8 +174,8 @@ fn end_civilly(
     Ok(())
 }
 
-/// Two columns do not determine the contact's centre. Followed without a limit, it once took
-/// rings for 223 GB.
+/// Two columns do not determine the centre of the contact. Without a limit, the iteration once
+/// allocated 223 GB for its rings.
 #[test]
 fn a_centre_that_the_pixels_do_not_determine_is_given_up() {
     end_civilly((19, 2), 12_243_987_543_208_780_806, [192, 252, 19, 3]).unwrap();

@@ -1,4 +1,4 @@
-//! A reused workspace gives what a new one gives, whatever it saw before.
+//! A reused workspace gives the results of a new one, whatever it was used for before.
 
 use ndarray::{Array2, ArrayView2};
 use tactile_force::{

@@ -1,15 +1,15 @@
-//! Images of contacts for the tests, numbers without pattern, and a calibration.
+//! Test images of contacts, pseudo-random numbers, and a calibration.
 
 use ndarray::Array2;
 use tactile_force::{CalibrationPair, LinearCalibration};
 
-/// A line of 1 µN a grey level.
+/// A line of 1 µN per grey level.
 pub(crate) fn calibration() -> LinearCalibration {
     let pairs = [0.0, 1e5, 2e5, 3e5, 4e5].map(|v| CalibrationPair::loading(v, 1e-6 * v));
     LinearCalibration::fit(&pairs, &Default::default()).unwrap()
 }
 
-/// Bytes without pattern, the same for the same seed.
+/// Pseudo-random bytes. Equal seeds give equal bytes.
 pub(crate) fn bytes(seed: u64) -> impl FnMut() -> u8 {
     let mut state = seed;
     move || {
@@ -26,8 +26,8 @@ pub(crate) fn noise(seed: u64) -> impl FnMut() -> f64 {
     move || f64::from(next() >> 4) / 4.0 - 2.0
 }
 
-/// Hertz's pressure A √(1 − r²/a²) averaged over the pixels of an image: along y in closed form,
-/// along x by midpoints, many where the edge may cut the pixel.
+/// Hertz's pressure A √(1 − r²/a²) averaged over the pixels of an image: in closed form along y,
+/// and by midpoints along x, with many midpoints if the edge may cut the pixel.
 pub(crate) fn hertz(size: (usize, usize), centre: [f64; 2], radius: f64, peak: f64) -> Array2<f64> {
     Array2::from_shape_fn(size, |(row, column)| {
         let [x, y] = [column as f64 - centre[0], row as f64 - centre[1]];

@@ -1,4 +1,4 @@
-//! Calibrations: what they recover, the errors that they state, what they refuse.
+//! Calibrations: results, stated errors, and refusals.
 
 use proptest::prelude::*;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
@@ -10,7 +10,7 @@ use tactile_force::{
 
 type Pairs = Vec<CalibrationPair>;
 
-/// Loading to two newtons in `steps` steps and back, along a curve, with noise in the force.
+/// Loading to two newtons in `steps` steps and unloading, along a curve, with noise in the force.
 fn cycle(steps: usize, noise: f64, seed: u64, curve: impl Fn(f64) -> f64) -> Pairs {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let normal = Normal::new(0.0, noise).unwrap();
@@ -51,7 +51,7 @@ fn exact_data_are_recovered_to_rounding() {
     assert!((r.r_squared - 1.0).abs() < 1e-14);
     assert!(r.hysteresis.unwrap().greatest_n.abs() < 1e-14);
     assert_eq!(c.range(), [0.0, 4e6]);
-    // Through the origin whatever the pairs.
+    // Through the origin, whatever the pairs are.
     let options = CalibrationOptions::default().with_zero_at_origin();
     let forced = LinearCalibration::fit(&cycle(20, 5e-3, 9, line), &options).unwrap();
     assert_eq!(forced.force_n(0.0), 0.0);
@@ -68,13 +68,13 @@ fn hysteresis_is_measured_with_its_sign() {
         p.force_n -= 0.08 * x * (1.0 - x);
     }
     let h = fitted(&pairs).report().hysteresis.unwrap();
-    // Greatest difference 0.02 N at half range, up to three times the noise of a difference. Mean
-    // 0.08/6.
+    // The largest difference is 0.02 N at half range, or up to three times the noise of a
+    // difference. The mean is 0.08/6.
     assert!((h.greatest_n - 0.02).abs() < 5e-4, "{h:?}");
     assert!((h.mean_n.value - 0.08 / 6.0).abs() < 5e-4, "{h:?}");
     assert!((h.share_of_full_scale - 0.01).abs() < 3e-4, "{h:?}");
-    // The curves lie between the branches: what they state of one force holds half of the
-    // difference, and of two it is common.
+    // The curves lie between the branches: the stated error of one force contains half of the
+    // difference, which is common to two forces.
     assert!((h.width_n / (0.04 / 6.0) - 1.0).abs() < 0.05, "{h:?}");
     let (curve, low, high) = (fitted(&pairs), 0.8e6, 2.4e6);
     assert!(curve.standard_error_n(low) >= h.width_n);
@@ -116,7 +116,7 @@ fn bad_pairs_are_refused() {
 proptest! {
     #[test]
     fn units_do_not_matter(scale in 1e-12_f64..1e12, seed in 0_u64..50) {
-        // Forces and pixel values in other units: the same curve in those units.
+        // Forces and pixel values in other units give the same curve in those units.
         let pairs = cycle(10, 5e-3, seed, bent);
         let scaled: Pairs = pairs.iter().map(|p| CalibrationPair {
             integrated_pixel_value: p.integrated_pixel_value * scale,
@@ -144,10 +144,11 @@ fn stated_errors_are_right() {
         stated += c.error_covariance_n2(at[0], at[2]);
         size += c.standard_error_n(at[0]) * c.standard_error_n(at[2]);
     }
-    // 68.3 % ± 1.5 % (binomial, 1000 seeds). Student's t with 38 degrees takes 0.5 % off.
+    // 68.3 % ± 1.5 % (binomial, 1000 seeds). Student's t with 38 degrees of freedom reduces it by
+    // 0.5 %.
     assert!(inside.iter().all(|n| (640..720).contains(n)), "{inside:?}");
-    // The mean of a thousand products of two errors is uncertain by √2/√1000 of their size at most.
-    // Three of that.
+    // The mean of a thousand products of two errors is uncertain by at most √2/√1000 of their size.
+    // Three times that.
     assert!(
         (seen - stated).abs() < 0.13 * size,
         "{seen} {stated} {size}"
@@ -162,8 +163,8 @@ fn confidence_intervals_cover_nineteen_in_twenty() {
             c.report().parameters[1].interval_95().contains(5e-7)
         })
         .count();
-    // 95 % ± 0.7 %: three standard deviations. Seven degrees of freedom: with the normal's 1.96 it
-    // would be 91 %.
+    // 95 % ± 0.7 %: three standard deviations. There are seven degrees of freedom; with the normal
+    // quantile 1.96 it would be 91 %.
     assert!((929..=971).contains(&inside), "{inside}");
 }
 
@@ -206,11 +207,11 @@ fn reading_adds_both_errors_and_flags_extrapolation() {
     }
 }
 
-/// The few pairs of a calibration by hand: Student's t reaches the interval of every force.
+/// A calibration by hand with few pairs: Student's t determines the interval of every force.
 #[test]
 fn intervals_of_forces_hold_with_few_pairs() {
     let gauge = Normal::new(0.0, 0.02).unwrap();
-    // What frames leave: 0.02 % of the force.
+    // Noise of a frame: 0.02 % of the force.
     let noise_of_frame = Normal::new(0.0, 120.0).unwrap();
     for count in [3, 4, 6] {
         let mut rng = ChaCha8Rng::seed_from_u64(count);

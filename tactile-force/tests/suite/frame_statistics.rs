@@ -1,4 +1,4 @@
-//! The pass against the obvious loop: integers, so equality is exact.
+//! The single pass compared with a direct loop: integers, so that equality is exact.
 
 use ndarray::{Array2, ArrayView2, Axis, Slice};
 use proptest::prelude::*;
@@ -41,7 +41,7 @@ fn slow(
     s
 }
 
-/// A pair of images: noise of any amplitude on any level, and perhaps one bright rectangle.
+/// A pair of images: noise of any amplitude on any level, possibly with one bright rectangle.
 fn images() -> impl Strategy<Value = (Array2<u8>, Array2<u8>)> {
     let size = (1_usize..90, 1_usize..2200);
     (size, any::<u64>(), 0_u8..=255, 0_u8..=255, any::<bool>()).prop_map(
@@ -70,7 +70,7 @@ proptest! {
         let prepared = ReferenceFrame::new(reference.view()).unwrap();
         let found = prepared.compare(frame.view(), threshold).unwrap();
         prop_assert_eq!(found, slow(frame.view(), reference.view(), threshold));
-        // The same pixels, column after column in memory.
+        // The same pixels, in column order in memory.
         let turned = |image: Array2<u8>| image.t().as_standard_layout().into_owned();
         let [frame, reference] = [frame, reference].map(turned);
         let prepared = ReferenceFrame::new(reference.t()).unwrap();

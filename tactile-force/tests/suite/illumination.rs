@@ -1,4 +1,4 @@
-//! Drift of the illumination, frame by frame, estimated outside the contact and divided out.
+//! Drift of the illumination, estimated in each frame outside the contact and divided out.
 
 use tactile_force::{Branch, DriftCorrection, DriftOutcome, ReferenceFrame};
 
@@ -41,13 +41,13 @@ fn five_percent_from_frame_to_frame_are_divided_out() {
             }
         }
     }
-    // Two standard errors. The reference's own error is common to all.
+    // Two standard errors. The error of the reference is common to all frames.
     assert!(inside * 10 >= count * 8, "{inside} of {count}");
 }
 
 #[test]
 fn what_cannot_be_told_is_said_and_left_alone() {
-    // A background of a quarter of a grey level: whole grey levels hide it.
+    // A background of a quarter of a grey level, which disappears in integer grey levels.
     let dark = Sensor {
         background: 0.25,
         vignetting: 0.0,
@@ -81,7 +81,7 @@ fn what_cannot_be_told_is_said_and_left_alone() {
     );
 }
 
-/// Grey levels of stray light over a lit background and over one of even brightness.
+/// Stray light over an illuminated background and over a uniform one, in grey levels.
 #[test]
 fn stray_light_is_taken_off_or_held_by_the_error() {
     for vignetting in [Sensor::default().vignetting, 0.0] {

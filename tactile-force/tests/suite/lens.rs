@@ -1,5 +1,5 @@
-//! The camera's geometry against an independent forward model: Brown's polynomial applied to the
-//! undistorted image.
+//! The geometry of the camera compared with an independent forward model: Brown's polynomial
+//! applied to the undistorted image.
 
 use proptest::prelude::*;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
@@ -10,8 +10,8 @@ const SHAPE: (usize, usize) = (1042, 1392);
 const CENTRE: [f64; 2] = [695.5, 520.5];
 const SIZE: [f64; 2] = [21.6e-6, 22.032e-6];
 
-/// Where a place in metres is seen by a lens that moves the corners inwards by `barrel`: distortion
-/// as a function of the undistorted radius, the other way round than the crate's model.
+/// Image position of a point in metres with a lens that moves the corners inwards by `barrel`. The
+/// distortion is a function of the undistorted radius, the inverse of the crate's model.
 fn seen(metres: [f64; 2], barrel: f64) -> [f64; 2] {
     let offset = [
         metres[0] - SIZE[0] * CENTRE[0],
@@ -26,8 +26,8 @@ fn seen(metres: [f64; 2], barrel: f64) -> [f64; 2] {
     ]
 }
 
-/// A target of 15 × 11 dots, 1.9 mm apart, turned by 10 mrad and shifted, centroids known to
-/// `noise` pixels.
+/// A target of 15 × 11 dots, 1.9 mm apart, rotated by 10 mrad and shifted. The noise of the
+/// centroids is `noise` pixels.
 fn target(barrel: f64, noise: f64, seed: u64, mirror: bool) -> Vec<DotPair> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let normal = Normal::new(0.0, noise).unwrap();
@@ -54,7 +54,7 @@ fn a_barrel_of_three_percent_and_oblong_pixels_are_recovered() {
         (aspect / (SIZE[1] / SIZE[0]) - 1.0).abs() < 1e-4,
         "{aspect}"
     );
-    // Distances are what a contact's radius needs: a ring of 2.7 mm anywhere in the frame.
+    // A contact radius depends on distances: a ring of 2.7 mm anywhere in the frame.
     let mut worst = 0.0_f64;
     for centre in [[5e-3, 4e-3], [15e-3, 11.5e-3], [24e-3, 18e-3]] {
         for k in 0..24 {
@@ -70,8 +70,9 @@ fn a_barrel_of_three_percent_and_oblong_pixels_are_recovered() {
             worst = worst.max((diameter / 5.4e-3 - 1.0).abs());
         }
     }
-    // Uncorrected, diameters are off by up to 8 %. Left are the third order that two coefficients
-    // of the inverse cannot hold (3e-4 at the very corner) and the dots' noise.
+    // Without correction, diameters are wrong by up to 8 %. The remaining errors are the third
+    // order, which two coefficients of the inverse cannot represent (3e-4 at the corner), and the
+    // noise of the dots.
     assert!(worst < 1e-3, "{worst}");
 }
 
@@ -93,7 +94,7 @@ fn stated_errors_are_those_of_repeated_targets() {
     }
     for (k, sum) in squares.iter().enumerate() {
         let ratio = (sum / seeds as f64).sqrt();
-        // A standard deviation from 400 seeds is known to 3.5 %. Three of that.
+        // A standard deviation from 400 seeds has an error of 3.5 %. Three times that.
         assert!((0.89..1.11).contains(&ratio), "parameter {k}: {ratio}");
     }
 }
@@ -139,7 +140,7 @@ fn geometries_without_meaning_are_refused() {
         lens.with_distortion([0.0; 2], 100.0, [f64::INFINITY, 0.0])
             .is_err()
     );
-    // 1 + 3 k₁ ρ² + 5 k₂ ρ⁴ vanishes at ρ = 1, or inside.
+    // 1 + 3 k₁ ρ² + 5 k₂ ρ⁴ vanishes at or inside ρ = 1.
     assert!(lens.with_distortion([0.0; 2], 100.0, [-0.34, 0.0]).is_err());
     assert!(lens.with_distortion([0.0; 2], 100.0, [-0.8, 0.28]).is_err());
     assert!(lens.with_distortion([0.0; 2], 100.0, [-0.3, 0.0]).is_ok());
@@ -167,8 +168,7 @@ proptest! {
     }
 }
 
-/// One ring of pixels against the whole contact, every part weighted with Hertz's pressure √(1 −
-/// r²/a²).
+/// One ring of pixels compared with the whole contact, weighted with Hertz's pressure √(1 − r²/a²).
 #[test]
 fn the_mean_area_of_a_contacts_pixels_is_that_under_the_pressure() {
     let lens = LensGeometry::new([20e-6; 2])
@@ -183,7 +183,7 @@ fn the_mean_area_of_a_contacts_pixels_is_that_under_the_pressure() {
         weights += weight;
     }
     let found = lens.mean_pixel_area_m2(centre, radius);
-    // Right to second order: 3 k₁² ρ⁴, which differs between the ring and the contact by 4e-6. Half
-    // pixels add some 1e-5.
+    // Accurate to second order: 3 k₁² ρ⁴, which differs between the ring and the contact by 4e-6.
+    // Half pixels contribute about 1e-5.
     assert!((found * weights / sum - 1.0).abs() < 5e-5, "{found:e}");
 }

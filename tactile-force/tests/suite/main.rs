@@ -1,4 +1,4 @@
-//! The tests of `tactile-force`, in one program.
+//! The tests of `tactile-force`, in a single program.
 
 mod bad_input;
 mod batch;

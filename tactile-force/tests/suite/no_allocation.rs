@@ -1,4 +1,4 @@
-//! After a warm-up a frame costs no allocation.
+//! After the first frames, measuring a frame does not allocate.
 
 use ndarray::{Array2, ArrayView2};
 use tactile_force::{
@@ -52,7 +52,7 @@ fn measuring_with_a_workspace_allocates_nothing() {
         });
         assert_eq!(allocations, 0, "{drift:?}");
     }
-    // By a local curve.
+    // With a local curve.
     let sensor = Sensor::default();
     let reference = sensor.reference();
     let curve = sensor.curve(&reference, 5);

@@ -1,6 +1,6 @@
-//! The local curve against an independent forward model: light that goes as a power of the
-//! pressure, vignetting, noise, whole grey levels. The scenes that are measured show another ball
-//! than the ones that calibrated.
+//! The local curve compared with an independent forward model: light proportional to a power of the
+//! pressure, vignetting, noise and integer grey levels. The measured scenes have another ball than
+//! the calibration.
 #![allow(clippy::print_stdout)]
 
 use proptest::prelude::*;
@@ -47,7 +47,7 @@ fn force_and_radius_of_another_ball_are_right_whatever_the_power() {
             "q {q}: force {:.4} (sums {:.4}), radius {:.4} (light {:.4})",
             local[0], summed[0], local[1], summed[1]
         );
-        // A modulus goes as F/a³: 1 % here is what the sum of both may cost it.
+        // A modulus is proportional to F/a³: 1 % is the allowance for the sum of both errors.
         assert!(local[0] < 0.01 && local[1] < 0.004, "q {q}: {local:?}");
         if (q - 1.0_f64).abs() > 0.15 {
             assert!(
@@ -86,8 +86,8 @@ fn stated_errors_cover_the_truth() {
         }
     }
     let share = inside as f64 / count as f64;
-    // 95.4 % if the errors were exact. Those of smoothing are an average over curves like this one,
-    // and four forces of one calibration share its error: 12 draws, ± 6 % each way.
+    // 95.4 % for exact errors. Those of smoothing are an average over curves like this one, and the
+    // four forces of one calibration have its error in common: 12 draws, ± 6 %.
     assert!(share > 0.8, "{share}");
 }
 
@@ -123,7 +123,7 @@ fn the_report_says_what_was_learned() {
             "{grey}: {found:?} {truth}"
         );
     }
-    // A reading is no surer than half of the lag.
+    // The error of a reading is at least half of the lag.
     let frame = sensor.frame(0.4, 2.5e-3, [121.3, 97.6], Branch::Loading, 8);
     let reading = measure(&frame, &reference, &curve, DriftCorrection::Automatic)
         .reading
@@ -139,7 +139,7 @@ fn grey_levels_beyond_those_seen_are_flagged() {
     let sensor = sensor(1.0);
     let reference = sensor.reference();
     let curve = sensor.curve(&reference, 4);
-    // A small ball presses harder than any of the calibration.
+    // The pressure of a small ball is higher than every pressure of the calibration.
     let frame = sensor.frame(0.15, 1.2e-3, [121.3, 97.6], Branch::Loading, 9);
     assert!(
         measure(&frame, &reference, &curve, DriftCorrection::Automatic)
@@ -203,7 +203,7 @@ proptest! {
                 CalibrationFrame::new(disc, noise * f64::from(*grey), Branch::Loading).unwrap()
             })
             .collect();
-        // Forces that fall throughout leave the sums without a rising curve. That is refused.
+        // If all forces decrease, the sums have no rising curve, which is refused.
         if let Ok(curve) = PressureCurve::fit(&frames, &PressureCurveOptions::default()) {
             prop_assert_eq!(curve.pressure_pa(0.0).value, 0.0);
             let pressure = |g: i32| curve.pressure_pa(f64::from(g)).value;

@@ -1,4 +1,4 @@
-//! A contact that is not a ball's is reported as such.
+//! A contact that is not that of a ball is reported.
 #![allow(clippy::print_stdout)]
 
 use ndarray::Array2;
@@ -12,8 +12,8 @@ use crate::simulated::{SHAPE, measure};
 /// Light at (x, y).
 type Level = dyn Fn(f64, f64) -> f64;
 
-/// The profile fitted to a contact whose light is `level` at (x, y) in units of a radius of 35
-/// pixels, 120 grey levels at 1.
+/// The profile fitted to a contact whose light is `level` at (x, y), in units of a radius of 35
+/// pixels and with 120 grey levels at 1.
 fn fitted(level: impl Fn(f64, f64) -> f64, seed: u64) -> HertzFit {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut frame = |pressed: bool| {
@@ -69,15 +69,15 @@ fn balls_are_balls() {
     }
 }
 
-/// Contacts at finite strain: finite elements give c from −0.3 (stiff balls sunk into soft layers)
-/// to 0.15 (balls flattened on glass).
+/// Contacts at finite strain: finite elements give c from −0.3 (stiff balls in soft layers) to 0.15
+/// (balls flattened on glass).
 #[test]
 fn radii_of_bent_profiles_are_right() {
     for (seed, bend) in [-0.3, -0.1, 0.08, 0.15].into_iter().enumerate() {
         let bent = |x: f64, y: f64| ball(x, y) * (1.0 - bend * radius2(x, y));
         let fit = fitted(bent, seed as u64);
         let (radius, found) = (fit.radius_px, fit.bend);
-        // Four standard errors and what 3 × 3 samples a pixel leave at the edge (0.01 px for a
+        // Four standard errors plus the error of 3 × 3 samples per pixel at the edge (0.01 px for a
         // Hertz profile).
         let off = (radius.value - 35.0).abs();
         assert!(
@@ -88,7 +88,7 @@ fn radii_of_bent_profiles_are_right() {
             (found.value - bend).abs() < 4.0 * found.standard_error + 0.005,
             "{bend}: {found:?}"
         );
-        // The centre's level, through half a grey level of rounding and the noise.
+        // The level of the centre, within half a grey level of rounding and the noise.
         let peak = fit.peak;
         assert!(
             (peak.value - 120.0).abs() < 4.0 * peak.standard_error + 0.1,
@@ -135,9 +135,9 @@ fn punches_pads_ellipses_and_rings_are_not() {
             fit.radial_misfit,
             fit.azimuthal_misfit
         );
-        // The best profile of what is no ball's has no minimum that Gauss and Newton's steps find:
-        // they end where χ² no longer falls. Two fits, with and without a bend, of the twelve steps
-        // that are ample for a ball, and a few.
+        // If the contact is not that of a ball, Gauss–Newton does not find a minimum, and ends when
+        // χ² no longer decreases. There are two fits, with and without a bend. Each has the twelve
+        // steps that are ample for a ball, and a few more.
         assert!(fit.iterations <= 40, "{name}: {}", fit.iterations);
     }
 }

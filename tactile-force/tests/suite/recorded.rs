@@ -1,8 +1,9 @@
-//! Answers of an earlier state of this crate, so that a change of its form changes no number.
+//! Results of an earlier version of this crate. They ensure that a change of the implementation
+//! changes no number.
 //!
-//! `tests/recorded/answers.txt` holds a line for every name. After a change that is meant to alter
-//! answers, write it anew with `RECORD_ANSWERS=1 cargo test -p tactile-force --test suite recorded`
-//! and read the difference before committing.
+//! `tests/recorded/answers.txt` contains one line per name. After a change that is meant to change
+//! results, rewrite it with `RECORD_ANSWERS=1 cargo test -p tactile-force --test suite recorded`
+//! and inspect the difference before committing.
 
 use test_support as record;
 
@@ -17,7 +18,7 @@ use crate::blob::{hertz, noise};
 
 const RECORDED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/recorded/answers.txt");
 
-/// Named numbers, in the order in which they were computed.
+/// Named numbers, in the order of their computation.
 #[derive(Default)]
 struct Answers {
     all: record::Answers,
@@ -256,9 +257,10 @@ fn answers_are_those_recorded() {
     frames(&mut answers);
     others(&mut answers);
     answers.all.check(RECORDED, |_, recorded, _| {
-        // A sum taken in another order moves the last digits of a double.
+        // A sum in another order changes the last digits of a double.
         let tolerance = 1e-12;
-        // Differences of nearly equal numbers: errors of a perfect fit, sums over a quiet frame.
+        // Differences of nearly equal numbers: errors of a perfect fit, sums over a frame without
+        // contact.
         (tolerance * recorded.abs()).max(1e-25)
     });
 }

@@ -1,6 +1,6 @@
-//! All building blocks together, in the order of the crate's page: a sensor whose light goes as a
-//! power of the pressure, behind a lens with vignetting and distortion, with oblong pixels and
-//! illumination that changes from frame to frame.
+//! All parts together, in the order of the crate documentation. The light of the sensor is
+//! proportional to a power of the pressure. The lens has vignetting and distortion, pixels are
+//! oblong, and the illumination changes from frame to frame.
 #![allow(clippy::print_stdout)]
 
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -12,7 +12,7 @@ use tactile_force::{
 
 use crate::simulated::{PIXEL_M, SHAPE, Sensor, contact_radius};
 
-/// The sensor with its illumination changed by up to 5 % either way.
+/// The sensor with its illumination changed by up to ±5 %.
 fn flickering(sensor: Sensor, rng: &mut ChaCha8Rng) -> Sensor {
     Sensor {
         illumination: 0.95 + 0.1 * rng.random::<f64>(),
@@ -20,7 +20,7 @@ fn flickering(sensor: Sensor, rng: &mut ChaCha8Rng) -> Sensor {
     }
 }
 
-/// Dots seen through the lens: every twentieth pixel, at the place that it shows.
+/// Dots seen through the lens: every twentieth pixel, at its true position.
 fn lens(sensor: &Sensor) -> LensFit {
     let mut dots = Vec::new();
     for row in (5..SHAPE.0).step_by(20) {
@@ -75,7 +75,7 @@ fn moduli_are_right_with_every_effect_at_once() {
         let mut errors = Vec::new();
         for k in 0..24_u64 {
             let force = [0.15, 0.25, 0.4][k as usize % 3];
-            // Anywhere that the contact fits.
+            // Any position at which the contact fits.
             let place = [
                 60.0 + 120.0 * rng.random::<f64>(),
                 60.0 + 85.0 * rng.random::<f64>(),

@@ -1,6 +1,6 @@
-//! Frames of an independent forward model: Hertz's contact, light that goes as a power of the
-//! pressure, vignetting, drifting illumination, noise and whole grey levels. None of it is the
-//! crate's own code.
+//! Frames of an independent forward model, which uses none of the crate's code: Hertz's contact,
+//! light proportional to a power of the pressure, vignetting, drifting illumination, noise and
+//! integer grey levels.
 
 use ndarray::Array2;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -15,21 +15,22 @@ pub(crate) const SHAPE: (usize, usize) = (200, 240);
 pub(crate) const PIXEL_M: f64 = 40e-6;
 pub(crate) const AREA_M2: f64 = PIXEL_M * PIXEL_M;
 
-/// A sensor whose light goes as the pressure to the power `q`.
+/// A sensor whose light is proportional to the pressure to the power `q`.
 #[derive(Clone, Copy)]
 pub(crate) struct Sensor {
     pub(crate) q: f64,
-    /// Light lost at the frame's corners.
+    /// Fraction of the light lost at the corners of the frame.
     pub(crate) vignetting: f64,
-    /// Relative lag of unloading: its light belongs to a pressure lower by this share.
+    /// Relative lag of unloading: its light corresponds to a pressure that is lower by this
+    /// fraction.
     pub(crate) hysteresis: f64,
     /// Relative brightness of the light source.
     pub(crate) illumination: f64,
-    /// Grey level of the sensor at rest, in the frame's middle.
+    /// Grey level of the sensor without load, in the middle of the frame.
     pub(crate) background: f64,
-    /// Share by which the lens moves the frame's corners inwards.
+    /// Fraction by which the lens moves the corners of the frame inwards.
     pub(crate) barrel: f64,
-    /// Height of a pixel over its width.
+    /// Height of a pixel divided by its width.
     pub(crate) aspect: f64,
 }
 
@@ -58,9 +59,9 @@ impl Sensor {
         120.0 * (pressure_pa / 60e3).powf(self.q)
     }
 
-    /// The undistorted place of a pixel, in pixel widths from where the first pixel would be: the
-    /// image of a place at the distance ρ (corners: 1) from the middle lies at ρ (1 − barrel ρ²),
-    /// solved here by iteration.
+    /// The undistorted position of a pixel, in pixel widths from the position of the first pixel. A
+    /// point at the distance ρ from the middle (1 at the corners) has its image at ρ (1 − barrel
+    /// ρ²), which is inverted here by iteration.
     pub(crate) fn place(&self, x: f64, y: f64) -> [f64; 2] {
         let middle = [0.5 * (SHAPE.1 as f64 - 1.0), 0.5 * (SHAPE.0 as f64 - 1.0)];
         let seen = [x - middle[0], self.aspect * (y - middle[1])];
@@ -76,8 +77,8 @@ impl Sensor {
         ]
     }
 
-    /// A frame of a contact at an undistorted place (x, y) in pixel widths. Without force, of the
-    /// sensor at rest.
+    /// A frame of a contact at an undistorted position (x, y) in pixel widths. Without force it is
+    /// a frame of the sensor without load.
     pub(crate) fn frame(
         &self,
         force_n: f64,
@@ -98,10 +99,10 @@ impl Sensor {
         Array2::from_shape_fn(SHAPE, |(y, x)| {
             let (x, y) = (x as f64, y as f64);
             let mut light = 0.0;
-            // Distortion moves a contact by less than twenty pixels.
+            // Distortion shifts a contact by less than twenty pixels.
             let margin = if distorted { 20.0 } else { 2.0 };
             if force_n > 0.0 && (x - cx).hypot(y - cy) < a + margin {
-                // The mean over the pixel, by three by three points.
+                // The mean over the pixel, at three by three points.
                 for k in 0..9 {
                     let (dx, dy) = (
                         f64::from(k % 3) / 3.0 - 1.0 / 3.0,
@@ -136,8 +137,8 @@ impl Sensor {
             .unwrap()
     }
 
-    /// Frames of a ball of 4 mm under 0.05 to 1 N, up and down, at places that differ, and a gauge
-    /// good to 0.2 %.
+    /// Frames of a ball of 4 mm under 0.05 to 1 N, up and down, at different positions, with a
+    /// gauge accurate to 0.2 %.
     pub(crate) fn calibration(
         &self,
         reference: &ReferenceFrame,

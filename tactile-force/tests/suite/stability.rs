@@ -1,4 +1,4 @@
-//! What the numbers must survive: turned images, dark contacts, rows left out.
+//! Required invariances: rotated images, dark contacts, omitted rows.
 
 use ndarray::Array2;
 use tactile_force::{
@@ -23,7 +23,7 @@ fn pressed(dark: bool, flip: bool) -> ForceMeasurement {
     } else {
         Polarity::Brighter
     };
-    // The light is read from tiles of 8 × 32 pixels, which a turned image cuts otherwise.
+    // The light is determined from tiles of 8 × 32 pixels, which differ in a rotated image.
     let contact = ContactOptions::default()
         .with_polarity(polarity)
         .with_drift(DriftCorrection::None);
@@ -42,7 +42,7 @@ fn pressed(dark: bool, flip: bool) -> ForceMeasurement {
 fn x_and_y_are_treated_alike() {
     let (a, b) = (pressed(false, false), pressed(false, true));
     let ([ax, ay], [bx, by]) = (a.profile.unwrap().centre_px, b.profile.unwrap().centre_px);
-    // Sums run in another order: rounding.
+    // Sums have another order: rounding.
     assert!((ax.value - by.value).abs() < 1e-9 && (ay.value - bx.value).abs() < 1e-9);
     assert_eq!(a.contact.unwrap().area_px, b.contact.unwrap().area_px);
     assert!((a.force_n.value - b.force_n.value).abs() < 1e-15);
@@ -51,15 +51,15 @@ fn x_and_y_are_treated_alike() {
 #[test]
 fn darkness_measures_as_light_does() {
     let (light, dark) = (pressed(false, false), pressed(true, false));
-    // Halves round away from zero, up in one image and down in the other: up to half a level in one
-    // of 4 pixels.
+    // Halves are rounded away from zero, up in one image and down in the other: up to half a level
+    // in one of 4 pixels.
     assert!((light.force_n.value / dark.force_n.value - 1.0).abs() < 5e-3);
     let radius = |m: &ForceMeasurement| m.profile.unwrap().radius_px.value;
     assert!((radius(&light) / radius(&dark) - 1.0).abs() < 2e-3);
 }
 
-/// Of a wide contact only every n-th row is looked at well inside the edge: the answer stays
-/// that of the profile.
+/// In a wide contact, only every n-th row well inside the edge is used: the result remains that of
+/// the profile.
 #[test]
 fn rows_left_out_of_a_wide_contact_do_not_move_the_fit() {
     let reference = Array2::from_elem((600, 620), 12_u8);
@@ -78,8 +78,8 @@ fn rows_left_out_of_a_wide_contact_do_not_move_the_fit() {
         )
         .unwrap();
         let (fit, found) = (m.profile.unwrap(), m.contact_radius_m.unwrap().value);
-        // Rounding to grey levels and one sample a pixel at the edge leave 10⁻⁴, as for contacts
-        // whose pixels all count.
+        // Rounding to grey levels and one sample per pixel at the edge cause errors of 10⁻⁴, as in
+        // contacts for which all pixels are used.
         assert!((found / radius - 1.0).abs() < 2e-4, "{radius}: {found}");
         assert!(
             (fit.peak.value / 200.0 - 1.0).abs() < 2e-3,

@@ -1,4 +1,4 @@
-//! The tests of `tactile-gel`, in one program.
+//! The tests of `tactile-gel`, in a single program.
 
 mod markers;
 mod measured;

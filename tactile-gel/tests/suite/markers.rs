@@ -1,4 +1,4 @@
-//! Markers on simulated frames with large shear, twist and missing prints, hidden dots and slip.
+//! Markers in simulated frames with large shear and twist, missing prints, hidden dots and slip.
 
 use nalgebra::Point2;
 use ndarray::Array2;
@@ -7,7 +7,7 @@ use tactile_gel::{Marker, MarkerField, find_markers, track_markers};
 
 type Motion<'a> = &'a dyn Fn(&Point2<f64>) -> Point2<f64>;
 
-/// Dots of a grid, each off its place by up to a fifth of the pitch.
+/// Dots of a grid, each displaced by up to a fifth of the pitch.
 fn places() -> Vec<Point2<f64>> {
     let off = |k: usize, share: f64| 5.0 * ((k as f64 * share).fract() - 0.5);
     let place = |k: usize| {
@@ -20,7 +20,7 @@ fn places() -> Vec<Point2<f64>> {
     (0..88).map(place).collect()
 }
 
-/// A frame with dark dots of 5 px under light that changes over it.
+/// A frame with dark dots of 5 px under light that varies over the frame.
 fn frame(dots: &[Point2<f64>]) -> Array2<f64> {
     Array2::from_shape_fn((340, 420), |(row, column)| {
         let at = Point2::new(column as f64, row as f64);
@@ -46,8 +46,8 @@ fn row_of(dots: &[Point2<f64>], marker: Point2<f64>) -> usize {
         .unwrap()
 }
 
-/// 30 % strain, a twist of 20° and every tenth marker gone: 99 in 100 pairs are right, and places
-/// are known to a tenth of a pixel.
+/// 30 % strain, a twist of 20° and every tenth marker missing: 99 of 100 pairs are correct, and
+/// positions are accurate to a tenth of a pixel.
 #[test]
 fn markers_are_followed_through_strain_and_twist() {
     let before = places();
@@ -76,13 +76,13 @@ fn markers_are_followed_through_strain_and_twist() {
         );
         let miss = |m: &Marker| (after[row_of(&after, m.position_px)] - m.position_px).norm();
         let square = markers.iter().map(|m| miss(m).powi(2)).sum::<f64>() / markers.len() as f64;
-        // Of two coordinates.
+        // The mean over two coordinates.
         assert!((0.5 * square).sqrt() < 0.1, "{name}: {square}");
     }
 }
 
-/// Markers that move by most of their distance are not paired with the markers that come into their
-/// places, and those that hardly move are paired as by the matcher.
+/// Markers that move by most of their distance are not paired with the markers that move to their
+/// positions. Markers that hardly move are paired as by the matcher.
 #[test]
 fn nearest_markers_are_not_taken_for_partners() {
     let marker = |p: Point2<f64>| Marker::new(p, 0.05, 60.0);
@@ -111,7 +111,7 @@ fn nearest_markers_are_not_taken_for_partners() {
     }
 }
 
-/// Fewer markers than have neighbours leave nothing to compare with: an answer or an error.
+/// Markers with too few neighbours for a comparison: a result or an error.
 #[test]
 fn few_or_no_markers_are_no_panic() {
     let markers: Vec<_> = (0..3)
@@ -126,8 +126,8 @@ fn few_or_no_markers_are_no_panic() {
     }
 }
 
-/// A third of the dots is hidden, and the sum over the others is 0.67 of the force. Errors hold the
-/// truth at two of them in 37 of 40 cases, however the hidden part lies in the field.
+/// A third of the dots is hidden, and the sum over the others is 0.67 of the force. The true value
+/// lies within two errors in 37 of 40 cases, wherever the hidden part is.
 #[test]
 fn hidden_markers_count_in_the_force() {
     let reference: Vec<_> = (0..120)
@@ -179,7 +179,7 @@ fn hidden_markers_count_in_the_force() {
     );
 }
 
-/// Dots of an annulus lag behind a disc that sticks and turns: their share, whatever the shift.
+/// Dots of an annulus lag behind a disc that sticks and rotates: their fraction, for any shift.
 #[test]
 fn markers_that_lag_behind_a_turning_disc_slip() {
     let places: Vec<_> = places()

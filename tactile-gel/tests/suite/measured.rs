@@ -1,4 +1,4 @@
-//! Real presses of a ball of known radius; skipped where the data are not there.
+//! Real presses of a ball of known radius. Skipped if the data are absent.
 #![allow(clippy::print_stdout)]
 
 use ndarray::Array3;
@@ -19,8 +19,8 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// Median angle in degrees from the ball in the circle, and mean height in millimetres from it with
-/// the zero left free.
+/// Median angle in degrees between the normals and the ball in the circle, and mean height
+/// difference in millimetres with a free zero.
 fn misses(frame: &GelFrame, [x0, y0, radius]: [f64; 3]) -> (f64, f64) {
     let (mut angles, mut heights) = (Vec::new(), Vec::new());
     for ((r, c), depth) in frame.depth_m.indexed_iter() {
@@ -42,7 +42,8 @@ fn misses(frame: &GelFrame, [x0, y0, radius]: [f64; 3]) -> (f64, f64) {
     (median(angles), height)
 }
 
-/// Normals and heights of presses that the sensor was not calibrated with: each half by the other.
+/// Normals and heights of presses that were not used for the calibration: each half is tested with
+/// the other.
 #[test]
 fn presses_held_back_have_their_ball() {
     let (Some(reference), Some(table)) = (
@@ -81,8 +82,8 @@ fn presses_held_back_have_their_ball() {
     let height = heights.iter().sum::<f64>() / heights.len() as f64;
     let angle = median(angles);
     println!("median {angle:.2}°, mean height {height:.4} mm");
-    // The circles were drawn by hand: perfect balls around their contacts' middles would miss them by
-    // 0.07 mm and 3.3 degrees.
+    // The circles were drawn by hand: perfect balls around the centres of the contacts would have
+    // differences of 0.07 mm and 3.3 degrees.
     assert!(angle < 5.1, "{angle}");
     assert!(height < 0.092, "{height}");
 }

@@ -1,4 +1,4 @@
-//! Frames that are not this sensor's, and right ones.
+//! Frames of other sensors, and valid frames.
 
 use crate::sensors::{BALL_PX, PIXEL_M, calibrated, calibrated_with, flat, gel, presses, random};
 use ndarray::{Array3, Axis};
@@ -19,7 +19,7 @@ fn of(
     Array3::from_shape_fn(frame.dim(), |(r, c, k)| frame[change(r, c, k)])
 }
 
-/// Each is named, and none is "no contact".
+/// Each foreign frame is recognised, and none gives "no contact".
 #[test]
 fn frames_of_others_are_named() {
     let gel = gel();
@@ -89,7 +89,7 @@ fn frames_of_others_are_named() {
     }
 }
 
-/// Exposures within a tenth, other noise and other objects are this sensor's.
+/// Exposures within a tenth, other noise and other objects belong to this sensor.
 #[test]
 fn right_frames_are_not_flagged() {
     let gel = gel();
@@ -121,7 +121,8 @@ fn right_frames_are_not_flagged() {
     }
 }
 
-/// A calibration doubts a ball whose diameter was given for the radius, and lengths in millimetres.
+/// A calibration doubts a ball whose diameter was given instead of its radius, and lengths in
+/// millimetres.
 #[test]
 fn a_wrong_ball_is_doubted() {
     let gel = gel();

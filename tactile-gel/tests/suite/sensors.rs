@@ -5,7 +5,7 @@ use tactile_gel::simulate::{ColourGel, ElasticFace, HertzPress};
 use tactile_gel::{BallPress, CalibrationReport, GelSensor};
 
 pub(crate) const PIXEL_M: f64 = 5e-5;
-/// Radius of the ball of the calibrations.
+/// Radius of the ball of the calibrations in pixels.
 pub(crate) const BALL_PX: f64 = 40.0;
 
 /// A gel of 240 × 320 pixels.
@@ -20,13 +20,13 @@ pub(crate) fn flat(gel: &ColourGel, seed: u64) -> Array3<u8> {
     gel.frame(&Array2::zeros((gel.shape[0], gel.shape[1])), seed)
 }
 
-/// Numbers from 0 to 1 that differ from index to index.
+/// Pseudo-random numbers from 0 to 1, one per index.
 pub(crate) fn random(index: usize, digit: usize) -> f64 {
     let mix = (index * 7919 + digit * 104_729 + 1) as f64;
     (mix.sin() * 43_758.545_3).rem_euclid(1.0)
 }
 
-/// Frames of twelve balls on a half-space, at many places and depths.
+/// Frames of twelve balls on a half-space, at different positions and depths.
 pub(crate) fn presses(gel: &ColourGel) -> Vec<Array3<u8>> {
     let press = |k: usize| {
         let at = [60.0 + 200.0 * random(k, 0), 60.0 + 120.0 * random(k, 1)];

@@ -1,4 +1,4 @@
-//! Faces whose contacts, depths and forces are known exactly.
+//! Surfaces whose contacts, depths and forces are known exactly.
 #![allow(clippy::print_stdout)]
 
 use crate::sensors::{BALL_PX, PIXEL_M, calibrated, flat, gel, presses, random};
@@ -21,9 +21,10 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// Contacts of 10 to 50 px, slopes from 0.04 to 0.5, on a half-space and on a bonded layer:
-/// areas within a tenth, depths and forces within their errors.
-/// `cargo run --release -p tactile-gel --example exact_worlds` draws more of them, under other lamps.
+/// Contacts of 10 to 50 px with slopes from 0.04 to 0.5, on a half-space and on a bonded layer:
+/// areas are within a tenth, depths and forces within their errors.
+/// `cargo run --release -p tactile-gel --example exact_worlds` renders more of them, under other
+/// lamps.
 #[test]
 fn areas_depths_and_forces_are_those_of_exact_worlds() {
     let gel = gel();
@@ -91,11 +92,12 @@ fn areas_depths_and_forces_are_those_of_exact_worlds() {
             let truth = press.force_n(stiff, PIXEL_M);
             force.push((found.value / truth - 1.0).abs());
             held[2] += within(found, truth);
-            // About the middle of the frame, without markers: the face's own three.
+            // About the middle of the frame, without markers: the three components of the surface
+            // itself.
             let wrench = law.wrench(&frame, None).unwrap();
             let [x, y] = [at[0] - 159.5, at[1] - 119.5].map(|px| px * PIXEL_M);
             for (moment, arm) in [(wrench.torque_nm[0], y), (wrench.torque_nm[1], -x)] {
-                // A centroid that is off by a pixel, and the force's own error.
+                // A centroid error of one pixel, and the error of the force.
                 let miss = (moment.unwrap().value - arm * truth).abs();
                 let bound = truth * PIXEL_M + 3.0 * found.standard_error * arm.abs();
                 assert!(miss < bound, "{k}: {wrench:?}, {arm} m times {truth} N");
@@ -133,7 +135,7 @@ fn areas_depths_and_forces_are_those_of_exact_worlds() {
     assert!(median(depth) < 0.03 && median(far) < 0.03 && median(force) < 0.05);
 }
 
-/// A frame without contact has none, the reference itself too.
+/// A frame without contact has none, and neither does the reference itself.
 #[test]
 fn untouched_frames_have_no_contact() {
     let gel = gel();
@@ -145,13 +147,13 @@ fn untouched_frames_have_no_contact() {
             "{seed}: {:?}",
             frame.doubts
         );
-        // Noise of 0.007 of the slopes adds up over the frame.
+        // Noise of 0.007 in the slopes accumulates over the frame.
         let largest = frame.depth_m.iter().fold(0.0_f64, |m, z| m.max(z.abs()));
         assert!(largest < 0.25 * PIXEL_M, "{seed}: {largest}");
     }
 }
 
-/// Contacts beside one another have what they have alone.
+/// Neighbouring contacts have the results that each has alone.
 #[test]
 fn several_contacts_are_those_alone() {
     let gel = gel();
@@ -187,7 +189,7 @@ fn several_contacts_are_those_alone() {
     }
 }
 
-/// A circle that is drawn wrong is named, and the sensor hardly changes.
+/// A wrongly drawn circle is reported, and the sensor hardly changes.
 #[test]
 fn a_wrong_circle_is_named() {
     let gel = gel();
@@ -213,7 +215,8 @@ fn a_wrong_circle_is_named() {
     assert!((a / b - 1.0).abs() < 0.5, "{a} {b}");
 }
 
-/// A gauge alone gives the forces of other presses of its ball: on a layer whose modulus nobody states.
+/// With a gauge the forces of other presses of its ball are determined, even on a layer whose
+/// modulus is not stated.
 #[test]
 fn a_gauge_gives_forces_without_a_layer() {
     let gel = gel();
@@ -239,7 +242,7 @@ fn a_gauge_gives_forces_without_a_layer() {
         (found.value - force) / found.standard_error
     });
     let misses: Vec<f64> = misses.collect();
-    // Of 20, 19 are expected within 2.2 errors by ten degrees of freedom.
+    // With ten degrees of freedom, 19 of 20 are expected within 2.2 errors.
     let held = misses.iter().filter(|z| z.abs() < 2.2).count();
     assert!(held >= 17, "{misses:?}");
     assert!(law.at_volume(1.0).standard_error.is_infinite());

@@ -1,20 +1,24 @@
-//! Errors of the inclusion search over a folder of solved scenes, against the Cramér–Rao bound.
+//! Errors of the inclusion search on a folder of solved scenes, compared with the Cramér–Rao bound.
 //!
 //! ```text
 //! cargo run --release -p tactile-inclusion --example inclusion_study -- FOLDER [SEEDS] [NAMES] [balls] [KERNEL]
 //! ```
 //!
-//! FOLDER holds `scenes.csv` (scene, D_m, depth_m, E1_pa, E0_pa, block_height_m, block_radius_m,
-//! disc_radius_m, nu, contact, approach_1_m …, force_1_n …; D_m = 0 for a plain block, cells of
-//! loads that a scene has not are empty) and for every scene a file `NAME.csv` (load_index, r_m,
-//! pressure_pa), solved by another program: `evidence/inclusion_scenes.py` makes such folders with
-//! CalculiX. Every scene is searched with SEEDS (default 1) draws of the sensor's errors: white
-//! noise of pixels, smooth errors of the calibration, force, and of what is known of the block: its
-//! height and the approaches' zero; Poisson's ratio is said to be 0.495 ± 0.005 whatever it is.
-//! NAMES keeps the scenes whose names begin with one of them, separated by commas. With `balls` the
-//! search is told that an inclusion is a ball. KERNEL draws the calibration's errors otherwise than
-//! the search takes them to be: `1mm` and `6mm` correlated over another length, `vignetting` as the
-//! square of the radius, `speckle` of 1 % over 0.3 mm.
+//! FOLDER contains `scenes.csv` (scene, D_m, depth_m, E1_pa, E0_pa, block_height_m, block_radius_m,
+//! disc_radius_m, nu, contact, approach_1_m …, force_1_n …). D_m is 0 for a plain block, and cells
+//! of missing loads are empty. For every scene there is a file `NAME.csv` (load_index, r_m,
+//! pressure_pa), solved by another program: `evidence/inclusion_scenes.py` creates such folders
+//! with CalculiX.
+//!
+//! Every scene is searched with SEEDS draws (default 1) of the errors of the sensor: white noise of
+//! pixels, smooth errors of the calibration, and errors of the force, of the height of the block
+//! and of the zero of the approaches. Poisson's ratio is stated as 0.495 ± 0.005 for every scene.
+//! NAMES selects the scenes whose names begin with one of them, separated by commas. With `balls`,
+//! the search assumes that an inclusion is a ball.
+//!
+//! KERNEL draws the errors of the calibration differently from the model of the search: `1mm` and
+//! `6mm` with another correlation length, `vignetting` as the square of the radius, and `speckle`
+//! of 1 % over 0.3 mm.
 #![allow(clippy::print_stdout)]
 
 mod scenes;
@@ -31,10 +35,10 @@ use tactile_inclusion::{
 };
 use tally::{Tally, parameters};
 
-/// A camera's pixel in metres, and its noise over the largest pressure.
+/// Pixel size of the camera in metres, and its noise relative to the largest pressure.
 const PIXEL_M: f64 = 86e-6;
 const PIXEL_NOISE: f64 = 7.5e-3;
-/// Scenes after which the figures so far are printed.
+/// Number of scenes after which intermediate results are printed.
 const SUMMARY_EVERY: usize = 10;
 
 /// Ring means of a smooth random field of unit variance.
@@ -52,17 +56,17 @@ fn smooth_field(radii_m: &[f64], length_m: f64, rng: &mut ChaCha8Rng) -> Vec<f64
                     (wave_number * radius * angle.cos()).cos()
                 })
                 .sum();
-            // The sine's part vanishes around the ring.
+            // The average of the sine around the ring vanishes.
             *mean += (2.0 / WAVES as f64).sqrt() * phase.cos() * around / ANGLES as f64;
         }
     }
     means
 }
 
-/// How the calibration's errors are drawn.
+/// Distribution of the errors of the calibration.
 #[derive(Clone, Copy, PartialEq)]
 enum Kernel {
-    /// Over a length in metres, as many times as large as the search takes them to be.
+    /// Correlated over a length in metres, and larger by a factor than the search assumes.
     Smooth(f64, f64),
     Vignetting,
 }
@@ -78,7 +82,7 @@ impl Kernel {
         })
     }
 
-    /// Ring means of unit variance, or so many times that.
+    /// Ring means of unit variance, times a factor.
     fn draw(self, radii_m: &[f64], rng: &mut ChaCha8Rng) -> Vec<f64> {
         match self {
             Self::Smooth(length_m, scale) => {
@@ -95,7 +99,7 @@ impl Kernel {
     }
 }
 
-/// White errors of the rings' means.
+/// White errors of the ring means.
 fn white_errors(scene: &SolvedScene) -> Vec<f64> {
     let width = scene.radii_m[1] - scene.radii_m[0];
     let inner = scene.pressures_pa.iter().flat_map(|frame| {
@@ -112,7 +116,7 @@ fn white_errors(scene: &SolvedScene) -> Vec<f64> {
     errors.collect()
 }
 
-/// A scene as it is measured: frames with errors, and what is said of the block.
+/// The measurement of a scene: frames with errors, and the stated properties of the block.
 fn measured(
     scene: &SolvedScene,
     seed: u64,
@@ -143,8 +147,8 @@ fn measured(
     Ok((specimen, frames))
 }
 
-/// Cramér–Rao bounds of ln D, ln d and ln E₁ at the truth, of the sensor's errors alone, for a ball
-/// that is known to be one.
+/// Cramér–Rao bounds of ln D, ln d and ln E₁ at the true values, from the errors of the sensor
+/// alone, for an inclusion that is known to be a ball.
 fn bounds(scene: &SolvedScene, lump: [f64; 4]) -> Result<ExpectedErrors, Box<dyn Error>> {
     let specimen =
         TissueBlock::new(scene.height_m, scene.radius_m)?.with_interface(scene.interface);
@@ -165,7 +169,7 @@ fn bounds(scene: &SolvedScene, lump: [f64; 4]) -> Result<ExpectedErrors, Box<dyn
     Ok(search.expected_errors(&assumed, &scene.approaches_m, &scene.radii_m, &white)?)
 }
 
-/// The processor's time where Linux tells it, else the clock's.
+/// Processor time on Linux, otherwise wall-clock time.
 fn seconds() -> f64 {
     let told = std::fs::read_to_string("/proc/self/schedstat").ok();
     let nanoseconds = told.and_then(|text| text.split(' ').next()?.parse::<f64>().ok());

@@ -7,7 +7,7 @@ use tactile_fem::Interface;
 
 pub(crate) struct SolvedScene {
     pub(crate) name: String,
-    /// D, d, E₁, and height over width; `None` for a plain block.
+    /// D, d, E₁, and height over width. `None` for a plain block.
     pub(crate) lump: Option<[f64; 4]>,
     pub(crate) block_modulus_pa: f64,
     pub(crate) height_m: f64,
@@ -41,7 +41,7 @@ pub(crate) fn scenes(folder: &Path) -> Result<Vec<SolvedScene>, Box<dyn Error>> 
             let load: usize = text(&point, "load_index")?.parse()?;
             let radius = shared::number(&point, "r_m")?;
             if radius == 0.0 {
-                // A ring has an area.
+                // A ring has a positive area.
                 continue;
             }
             if load == 1 {
@@ -50,7 +50,7 @@ pub(crate) fn scenes(folder: &Path) -> Result<Vec<SolvedScene>, Box<dyn Error>> 
             pressures_pa[load - 1].push(shared::number(&point, "pressure_pa")?);
         }
         let diameter = number("D_m")?;
-        // Folders of balls do without that column.
+        // Folders of balls do not have this column.
         let aspect = number("aspect").unwrap_or(1.0);
         let lump = [diameter, number("depth_m")?, number("E1_pa")?, aspect];
         scenes.push(SolvedScene {

@@ -1,4 +1,4 @@
-//! What both studies share: files of solved scenes, the guide, and smooth errors.
+//! Code used by both studies: files of solved scenes, the guide, and smooth errors.
 
 use rand::{RngExt, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
@@ -7,7 +7,7 @@ use std::error::Error;
 use std::path::Path;
 use tactile_fem::{Guide, GuideLayer, Material};
 
-/// A row of a file by the names of its columns.
+/// A row of a file, by the names of its columns.
 pub(crate) type Row = HashMap<String, String>;
 
 pub(crate) fn table(path: &Path) -> Result<Vec<Row>, Box<dyn Error>> {
@@ -32,7 +32,7 @@ pub(crate) fn number(row: &Row, name: &str) -> Result<f64, Box<dyn Error>> {
     Ok(text(row, name)?.parse()?)
 }
 
-/// The sensor's guide in all scenes.
+/// The guide of the sensor in all scenes.
 pub(crate) fn guide(radius_m: f64) -> Result<Guide, Box<dyn Error>> {
     let layer = |thickness_m, modulus| -> Result<GuideLayer, Box<dyn Error>> {
         Ok(GuideLayer {
@@ -48,9 +48,9 @@ pub(crate) fn normal(rng: &mut ChaCha8Rng) -> f64 {
     rng.sample(StandardNormal)
 }
 
-/// Wave vector and phase of one of the waves that sum up to a smooth random field in the plane with
-/// Matérn's kernel of order 3/2: wave vectors follow the kernel's spectrum, Student's t with three
-/// degrees of freedom.
+/// Wave vector and phase of one of the waves whose sum is a smooth random field in the plane with
+/// Matérn's kernel of order 3/2. Wave vectors follow the spectrum of the kernel, which is Student's
+/// t with three degrees of freedom.
 pub(crate) fn wave(length_m: f64, rng: &mut ChaCha8Rng) -> ([f64; 2], f64) {
     let chi_squared: f64 = (0..3).map(|_| normal(rng).powi(2)).sum();
     let scale = (3.0 / chi_squared).sqrt() / length_m;

@@ -2,7 +2,7 @@
 
 use tactile_inclusion::{Identifiable, Inclusion, InclusionEstimate};
 
-/// Bound on a relative error up to which a parameter can be told.
+/// Bound of a relative error up to which a parameter counts as determined.
 const TELLABLE: f64 = 0.3;
 
 pub(crate) fn parameters(inclusion: &Inclusion) -> [Identifiable; 3] {
@@ -15,26 +15,27 @@ pub(crate) fn parameters(inclusion: &Inclusion) -> [Identifiable; 3] {
 
 #[derive(Default)]
 pub(crate) struct Tally {
-    /// |error| over the bound of each parameter, where that is below 30 %.
+    /// |error| relative to the bound of each parameter, if the bound is below 30 %.
     ratios: [Vec<f64>; 3],
-    /// Relative errors on wide shallow lumps.
+    /// Relative errors for wide shallow lumps.
     shallow: [Vec<f64>; 3],
     within: [usize; 3],
     told: [usize; 3],
     shapes: usize,
     shapes_within: usize,
-    /// Parameters told whose interval does not hold the truth, by how many standard errors at most.
+    /// Determined parameters whose interval does not contain the true value, and the largest
+    /// deviation in standard errors.
     wrong: usize,
     worst: f64,
-    /// Parameters whose bound is above 30 %, and those of them not told.
+    /// Parameters whose bound is above 30 %, and how many of them are not determined.
     open: usize,
     left_open: usize,
     findable: usize,
     findable_found: usize,
     plain: usize,
     false_alarms: usize,
-    /// Processor's time of searches, and of one solution of the model with its derivatives, from
-    /// nothing.
+    /// Processor time of searches, and of one solution of the model with its derivatives, from
+    /// scratch.
     pub(crate) search_seconds: Vec<f64>,
     pub(crate) model_seconds: Vec<f64>,
 }
@@ -74,7 +75,7 @@ impl Tally {
 
     pub(crate) fn add_shape(&mut self, aspect: f64, [low, high]: [f64; 2]) {
         self.shapes += 1;
-        // A ball's interval may be a point.
+        // The interval of a ball may be a single point.
         let within = low * (1.0 - 1e-9)..=high * (1.0 + 1e-9);
         self.shapes_within += usize::from(within.contains(&aspect));
     }

@@ -1,10 +1,10 @@
-//! Files of cases whose partners are known.
+//! Files of cases with known partners.
 //!
 //! A case is `case NAME D n_model n_target`, then rows `m` (model), `t` (target), `g` (true
 //! position of each model row) and `p` (row of its true partner, −1 for none).
 #![allow(dead_code)] // a study need not look at all of a case
 
-/// One case as it stands in the file.
+/// One case of the file.
 #[derive(Default)]
 pub(crate) struct Case {
     pub(crate) name: String,

@@ -3,7 +3,7 @@
 use crate::stream::Stream;
 use nalgebra::{Point, SVector};
 
-/// A jittered sunflower disc of radius 1, in space under a bell.
+/// A jittered sunflower disc of radius 1, in space with the shape of a bell.
 pub(crate) fn disc<const D: usize>(
     n: usize,
     jitter: f64,

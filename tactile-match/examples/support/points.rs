@@ -1,4 +1,4 @@
-//! Point sets of the unit cube and where they go.
+//! Point sets of the unit cube and their transformations.
 
 use crate::stream::Stream;
 use nalgebra::{Point, SVector};
@@ -31,7 +31,7 @@ pub(crate) fn bend<const D: usize>(p: &Point<f64, D>) -> Point<f64, D> {
     }))
 }
 
-/// Bent and turned about the centre.
+/// Bent, and rotated about the centre.
 pub(crate) fn turn<const D: usize>(p: &Point<f64, D>, degrees: f64) -> Point<f64, D> {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let mut q = bend(p);

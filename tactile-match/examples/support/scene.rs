@@ -1,9 +1,9 @@
-//! Point sets whose partners are known.
+//! Point sets with known partners.
 
 use nalgebra::Point;
 
-/// A model, where its points truly go, and targets, of which the first have the model rows of
-/// `order` as partners.
+/// A model, the true positions of its points, and targets. The partners of the first targets are
+/// the model rows of `order`.
 pub(crate) struct Scene<const D: usize> {
     pub(crate) model: Vec<Point<f64, D>>,
     pub(crate) truth: Vec<Point<f64, D>>,

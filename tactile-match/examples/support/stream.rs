@@ -1,4 +1,4 @@
-//! Repeatable random numbers of the examples.
+//! Reproducible random numbers for the examples.
 
 /// SplitMix64.
 pub(crate) struct Stream(pub(crate) u64);
@@ -13,7 +13,7 @@ impl Stream {
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// A standard normal deviate, nearly.
+    /// An approximately standard normal deviate.
     pub(crate) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.next()).sum::<f64>() - 6.0
     }

@@ -1,6 +1,6 @@
-//! Confidences beside the share of pairs that are right.
+//! Confidences compared with the fraction of correct pairs.
 
-/// Pairs, sum of confidences and right pairs of every tenth of confidence.
+/// Pairs, sum of confidences and correct pairs in every tenth of confidence.
 #[derive(Default)]
 pub(crate) struct Tenths([[f64; 3]; 10]);
 

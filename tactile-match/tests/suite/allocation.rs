@@ -1,4 +1,4 @@
-//! A batch through one workspace allocates nothing after its first match.
+//! A batch with one workspace does not allocate after its first match.
 use nalgebra::Point2;
 use std::ops::ControlFlow;
 use tactile_match::{
@@ -15,7 +15,7 @@ fn a_batch_of_small_matches_allocates_nothing_after_the_first() {
             )
         })
         .collect();
-    // Every other target is noisy, so that the long way with all starts is covered as well.
+    // Every other target is noisy, so that the full search with all starts is also covered.
     let target = |shift: f64, noise: f64| -> Vec<Point2<f64>> {
         let wobble = |i: usize| noise * (12.9 * i as f64).sin();
         model
@@ -46,7 +46,7 @@ fn pairs_along_a_series_allocate_nothing() {
         Point2::new(stretch * r * turn.cos(), r * turn.sin())
     };
     let model: Vec<_> = (0..80).map(|i| place(i, 1.0)).collect();
-    // Steps that the last answer is followed over, and a leap that asks for the whole search.
+    // Steps over which the last result is followed, and a jump that requires the full search.
     let targets = [1.02, 1.04, 1.06, 1.6, 1.04]
         .map(|stretch| (0..80).map(|i| place(i, stretch)).collect::<Vec<_>>());
     let matcher = AnnealedSoftassign::default();

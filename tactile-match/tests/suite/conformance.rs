@@ -1,4 +1,4 @@
-//! What every [`PointMatcher`] must do, in 2-D and 3-D.
+//! Requirements for every [`PointMatcher`], in 2-D and 3-D.
 
 use crate::common::{
     Scene, Stream, bend, grid, largest_step, matched, matchers, reordered, scattered,
@@ -19,7 +19,7 @@ macro_rules! for_all {
     };
 }
 
-/// Scattered points, and a regular grid, whose neighbours are as near as any other's.
+/// Scattered points, and a regular grid with many equally near neighbours.
 #[test]
 fn identical_sets_match_themselves() {
     fn check<const D: usize>(name: &str, matcher: &dyn PointMatcher<D>) {
@@ -28,7 +28,7 @@ fn identical_sets_match_themselves() {
             let matching = matched(name, matcher, &points, &points);
             let expected: Vec<_> = (0..points.len()).map(Some).collect();
             assert_eq!(matching.assignment, expected, "{name}");
-            // A tenth of the spacing: what a registration that stops early may leave.
+            // A tenth of the spacing: the possible error of a registration that stops early.
             assert!(
                 largest_step(&matching.warped, &points) < 0.1 * spacing,
                 "{name}"
@@ -60,7 +60,7 @@ fn the_order_of_the_points_does_not_matter() {
             .map(|&i| plain.assignment[i].and_then(|j| place[j]))
             .collect();
         assert_eq!(shuffled.assignment, expected, "{name}");
-        // Sums in another order differ by rounding, which iterations may enlarge.
+        // Sums in another order differ by rounding, which iterations may amplify.
         assert!(
             largest_step(&shuffled.warped, &reordered(&plain.warped, &rows)) < 1e-6,
             "{name}"
@@ -88,8 +88,8 @@ fn sets_of_different_size_are_matched() {
             let right = (0..45)
                 .filter(|&i| matching.assignment[i] == Some(i))
                 .count();
-            // What the leftover points lie on has no answer of its own; nine tenths of the rest
-            // must be right.
+            // The positions of the remaining points have no unique result; nine tenths of the
+            // others must be correct.
             assert!(right >= 41, "{name}: {right} of 45");
         }
     }

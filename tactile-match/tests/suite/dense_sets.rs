@@ -1,17 +1,17 @@
-//! Sets whose displacements are many times their spacing, evenly spread: annealing alone leaves
-//! parts one point aside.
+//! Evenly distributed sets whose displacements are many times their spacing: annealing alone leaves
+//! parts displaced by one point.
 use nalgebra::{Point, Point2, Point3};
 use std::ops::ControlFlow;
 use tactile_match::{AnnealedSoftassign, PointMatcher, SoftassignMatch, SoftassignWorkspace};
 
-/// A number of (−1, 1), without pattern and the same on every machine.
+/// A pseudo-random number in (−1, 1), the same on every machine.
 fn scatter(i: usize, k: usize) -> f64 {
     let square = (i * i) as f64;
     2.0 * (square * [0.618_033_988_75, 0.754_877_666_25][k] + i as f64 * 0.569_840_291).fract()
         - 1.0
 }
 
-/// A sunflower's disc of radius 1, its points moved by up to an eighth of their spacing.
+/// A sunflower disc of radius 1, with points displaced by up to an eighth of their spacing.
 fn sunflower(n: usize) -> Vec<Point2<f64>> {
     let place = |i: usize| {
         let (r, angle) = (((i as f64 + 0.5) / n as f64).sqrt(), 2.399_963 * i as f64);
@@ -24,7 +24,8 @@ fn sunflower(n: usize) -> Vec<Point2<f64>> {
     (0..n).map(place).collect()
 }
 
-/// Turned by `angle`, which an even disc does not show, and pushed by up to a tenth of its radius.
+/// Rotated by `angle`, which is not visible in an even disc, and displaced by up to a tenth of its
+/// radius.
 fn warp(p: &Point2<f64>, angle: f64) -> Point2<f64> {
     let bump = |x: f64, y: f64| (-((p.x - x).powi(2) + (p.y - y).powi(2)) / 0.8).exp();
     let (a, b) = (bump(0.5, 0.3), bump(-0.6, -0.2));
@@ -35,14 +36,14 @@ fn warp(p: &Point2<f64>, angle: f64) -> Point2<f64> {
     )
 }
 
-/// Matches and counts: pairs that are right, and pairs that are not.
+/// Matches, and counts correct and wrong pairs.
 fn score<const D: usize>(
     model: &[Point<f64, D>],
     target: &[Point<f64, D>],
     outliers: usize,
 ) -> (usize, usize) {
     let n = model.len();
-    // Row i of the model is row (7 i + 3) mod n of the target, outliers follow.
+    // Row i of the model is row (7 i + 3) mod n of the target, followed by outliers.
     assert!(target.len() == n + outliers && !n.is_multiple_of(7));
     let mut shuffled = target.to_vec();
     (0..n).for_each(|i| shuffled[(7 * i + 3) % n] = target[i]);
@@ -71,15 +72,15 @@ fn no_part_of_a_turned_disc_lies_one_point_aside() {
 #[test]
 fn outliers_and_a_little_noise_do_not_mislead_the_patterns() {
     let model = sunflower(1000);
-    // A fiftieth of the spacing, and one outlier a twenty points.
+    // A fiftieth of the spacing, and one outlier per twenty points.
     let noisy = |(i, p): (usize, &Point2<f64>)| {
         warp(p, 0.1) + 0.001 * Point2::new(scatter(i + 7, 0), scatter(i + 7, 1)).coords
     };
     let mut target: Vec<_> = model.iter().enumerate().map(noisy).collect();
     target.extend((0..50).map(|i| Point2::new(1.1 * scatter(i + 3, 1), 1.1 * scatter(i + 3, 0))));
     let (right, wrong) = score(&model, &target, 50);
-    // An outlier that lies closer than the noise to a place takes it rightly, as far as any matcher
-    // can tell.
+    // An outlier that is closer to a position than the noise is a valid partner, as far as a
+    // matcher can determine.
     assert!(right >= 998 && wrong <= 2, "{right} right, {wrong} wrong");
 }
 
@@ -115,8 +116,8 @@ fn what_a_workspace_did_before_changes_no_answer_and_saves_the_memory() {
         let found = AnnealedSoftassign::default().match_points_with(workspace, model, target, go);
         seen(found.unwrap());
     };
-    // The first scene is turned so far that patterns are looked at, with a wider spacing than the
-    // second's, whose first run is nearly right.
+    // The rotation of the first scene requires a comparison of patterns, with a wider spacing than
+    // that of the second scene, whose first run is nearly correct.
     let (coarse, dense) = (scene(700, 0.0, 0.15), scene(900, 0.006, 0.0));
     let mut used = SoftassignWorkspace::default();
     check(&mut used, &coarse, &mut |found| {

@@ -1,5 +1,4 @@
-//! Coherent point drift against its equations written out slowly, and against what it must not
-//! depend on.
+//! Coherent point drift compared with a slow implementation of its equations, and its invariances.
 
 use crate::common::{Stream, bend, largest_step, reordered, rotation, scattered};
 use nalgebra::{DMatrix, Point, Point2, Point3, SVector, Vector3};
@@ -16,9 +15,9 @@ fn drift<const D: usize>(
     options.match_points(model, target).expect("valid points")
 }
 
-/// Eq. 22–23 and figure 4 of Myronenko & Song with whole matrices and an LU factorisation in every
-/// iteration. Ends early where σ² has shrunk to a ten-thousandth: collapsing onto the targets is a
-/// matter of rounding. Returns the iterations too.
+/// Eq. 22–23 and figure 4 of Myronenko and Song with full matrices and an LU factorisation in every
+/// iteration. Ends early if σ² has decreased to a ten-thousandth, because the collapse onto the
+/// targets is dominated by rounding. Also returns the number of iterations.
 fn slow_non_rigid<const D: usize>(
     model: &[Point<f64, D>],
     target: &[Point<f64, D>],
@@ -71,8 +70,8 @@ fn slow_non_rigid<const D: usize>(
     )
 }
 
-/// The tolerance is that of the kernel's factorisation, 1e-12, over the ridge λσ² ≥ 1e-4 of the
-/// first iterations.
+/// The tolerance is that of the factorisation of the kernel, 1e-12, divided by the ridge λσ² ≥ 1e-4
+/// of the first iterations.
 fn check_against_slow<const D: usize>(
     seed: u64,
     rows: usize,
@@ -128,7 +127,7 @@ proptest! {
         let other = drift(options, &moved(&model), &moved(&target));
         prop_assert_eq!(&other.assignment, &plain.assignment);
         prop_assert_eq!(other.report.iterations, plain.report.iterations);
-        // Points 1e3 from the origin have lost three digits, which the iterations may enlarge.
+        // Points 1e3 from the origin lose three digits, which the iterations may amplify.
         prop_assert!(largest_step(&other.warped, &moved(&plain.warped)) <= 1e-8 * scale);
     }
 
@@ -186,7 +185,8 @@ fn the_warp_takes_the_model_along_and_its_jacobian_is_its_derivative() {
     let found = drift(CoherentPointDrift::default(), &model, &target);
     let warp = &found.warp;
     let images: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
-    // The pivots' triangular system has about the square root of the kernel's condition, 1e6.
+    // The triangular system of the pivots has about the square root of the condition of the kernel,
+    // 1e6.
     assert!(
         largest_step(&images, &found.warped) < 1e-9,
         "{}",

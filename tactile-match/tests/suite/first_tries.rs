@@ -1,12 +1,12 @@
-//! What users feed a matcher first: the same points twice, drifts, lattices that go on beyond the
-//! view, noisy grids, partial overlaps, points far away, points on a line.
+//! Inputs on which users first try a matcher: the same points twice, drifts, lattices that extend
+//! beyond the view, noisy grids, partial overlaps, distant points, points on a line.
 
 use crate::common::Stream;
 use nalgebra::{Point, Point2, Point3, SVector};
 use tactile_match::{AnnealedSoftassign, Doubt, Outliers, PointMatcher, Search};
 
-/// Points of both views, the targets in another order. `partner[i]` is the target of model row `i`,
-/// if that is in view.
+/// Points of both views, with the targets in another order. `partner[i]` is the target of model row
+/// `i`, or `None` if it is not in view.
 struct Views<const D: usize> {
     model: Vec<Point<f64, D>>,
     target: Vec<Point<f64, D>>,
@@ -14,7 +14,7 @@ struct Views<const D: usize> {
 }
 
 impl<const D: usize> Views<D> {
-    /// Points before and after, as far as both are seen, with noise of the targets.
+    /// Visible points before and after, with noise of the targets.
     fn new(
         world: impl IntoIterator<Item = (Point<f64, D>, Point<f64, D>)>,
         seen: impl Fn(&Point<f64, D>, &mut Stream) -> bool,
@@ -46,7 +46,7 @@ impl<const D: usize> Views<D> {
         }
     }
 
-    /// Share of the true pairs that are found, and the doubt.
+    /// Fraction of the true pairs that are found, and the doubt.
     fn found(&self, matcher: AnnealedSoftassign) -> (f64, Option<Doubt>)
     where
         AnnealedSoftassign: PointMatcher<D>,
@@ -64,7 +64,7 @@ fn random<const D: usize>(n: usize, stream: &mut Stream) -> Vec<Point<f64, D>> {
     (0..n).map(|_| place()).collect()
 }
 
-/// A lattice of step 10 that is turned and moved behind a window of 14 steps.
+/// A lattice of step 10 that is rotated and displaced behind a window of 14 steps.
 fn lattice(hexagonal: bool, noise: f64, degrees: f64, shift: f64) -> Views<2> {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let points = (-20..40_i32).flat_map(|row| (-20..40_i32).map(move |column| (row, column)));
@@ -82,8 +82,8 @@ fn lattice(hexagonal: bool, noise: f64, degrees: f64, shift: f64) -> Views<2> {
     Views::new(world, inside, noise, &mut Stream::new(5))
 }
 
-/// A lattice looks the same after a step. What moved by less than a sixth of it is told, anything
-/// else is right or doubted with the step.
+/// A lattice is unchanged by a step. A displacement of less than a sixth of a step is recognised;
+/// otherwise the result is correct, or its doubt names the step.
 #[test]
 fn a_lattice_beyond_the_view_is_right_or_named() {
     for hexagonal in [false, true] {
@@ -114,7 +114,7 @@ fn a_lattice_beyond_the_view_is_right_or_named() {
     }
 }
 
-/// With the largest motion stated the answer within it has no rival.
+/// If the largest displacement is stated, the result within it is unique.
 #[test]
 fn a_largest_motion_tells_the_answers_of_a_lattice_apart() {
     for shift in [3.0, 4.5] {
@@ -132,7 +132,7 @@ fn a_largest_motion_tells_the_answers_of_a_lattice_apart() {
     }
 }
 
-/// A grid with equal noise in both frames is its own mirror image as far as anyone can see.
+/// A grid with equal noise in both frames cannot be distinguished from its mirror image.
 #[test]
 fn a_noisy_grid_is_neither_mirrored_nor_turned() {
     for seed in 0..20 {
@@ -153,7 +153,7 @@ fn a_noisy_grid_is_neither_mirrored_nor_turned() {
     }
 }
 
-/// The same points twice, seen through windows apart, stretched and bent by several spacings.
+/// The same points twice, seen through different windows, stretched and bent by several spacings.
 #[test]
 fn thousands_of_plane_points_are_followed() {
     let mut stream = Stream::new(9);
@@ -177,8 +177,9 @@ fn thousands_of_plane_points_are_followed() {
     check("drift", 6000, 0.0, 0.999, &inside, &|p| {
         Point2::new(p.x + 0.045, p.y)
     });
-    // Random points within two deviations of the noise trade places: πσ² of them, one in thirty. By
-    // up to 24 spacings, and within a block by more than one.
+    // Random points closer than two standard deviations of the noise are exchanged: a fraction πσ²
+    // of them, one in thirty. The displacement is up to 24 spacings, and more than one within a
+    // block.
     let missing = |_: &Point2<f64>, stream: &mut Stream| stream.next() > 0.1;
     check("bent", 40_000, 0.1 / 200.0, 0.96, &missing, &|p| {
         Point2::new(
@@ -188,7 +189,7 @@ fn thousands_of_plane_points_are_followed() {
     });
 }
 
-/// Where a third of the points of either set lies outside the other, the rest is found.
+/// If a third of the points of each set lies outside the other, the rest is found.
 #[test]
 fn a_partial_overlap_in_space_loses_no_pairs() {
     for seed in 0..12 {
@@ -226,7 +227,7 @@ fn a_partial_overlap_in_space_loses_no_pairs() {
     }
 }
 
-/// One point at a thousand times the size sets neither centre nor scale.
+/// A single point at a thousand times the size affects neither centre nor scale.
 #[test]
 fn a_point_far_away_does_not_hinder_the_others() {
     let mut stream = Stream::new(3);
@@ -246,7 +247,7 @@ fn a_point_far_away_does_not_hinder_the_others() {
     }
 }
 
-/// Points on a line have a noise, and every pair is told.
+/// Points on a line have an estimated noise, and every pair is found.
 #[test]
 fn points_on_a_line_are_matched() {
     for n in [5_u32, 20, 60] {
@@ -271,7 +272,7 @@ fn points_on_a_line_are_matched() {
     }
 }
 
-/// Where every point has a partner none is left over, however noisy.
+/// If every point has a partner, all are paired, whatever the noise.
 #[test]
 fn sets_of_the_same_points_are_paired_completely() {
     let mut stream = Stream::new(11);
@@ -287,7 +288,8 @@ fn sets_of_the_same_points_are_paired_completely() {
     assert!(found.unmatched_model.is_empty() && found.unmatched_target.is_empty());
 }
 
-/// The same file twice: leaves of a sunflower, next to which another lies in nearly the same way.
+/// The same file twice: a sunflower, in which each point has neighbours with nearly the same
+/// surroundings.
 #[test]
 fn the_same_points_twice_are_all_matched() {
     let leaf = |k: usize| {

@@ -1,5 +1,5 @@
-//! Points a caller may come with by mistake, to every matcher: an answer that is consistent or a
-//! typed error, never a panic and never NaN.
+//! Points that a caller may pass by mistake, for every matcher: a consistent result or a typed
+//! error, never a panic and never NaN.
 
 use crate::common::hostile_points;
 use crate::corpus::points::every_matcher;

@@ -1,4 +1,4 @@
-//! Sets of thousands of points, which are matched coarse to fine.
+//! Sets of thousands of points, which are matched from coarse to fine.
 
 use crate::common::{Scene, Stream, bend, scattered};
 use nalgebra::Point;
@@ -18,7 +18,7 @@ fn scene<const D: usize>(noise: f64, outliers: usize) -> Scene<D> {
     Scene::new(model, truth, order, |_| noise, outliers, &mut stream)
 }
 
-/// Share of the model points whose partner is their own.
+/// Fraction of the model points that are matched to their own partner.
 fn right<const D: usize>(scene: &Scene<D>, assignment: &[Option<usize>]) -> f64 {
     scene.right(assignment) as f64 / POINTS as f64
 }
@@ -30,10 +30,10 @@ fn check_clean<const D: usize>() {
             .match_points(&scene.model, &scene.target)
             .expect("good points");
         let right = right(&scene, &found.assignment);
-        // An outlier may take the place of a point that it nearly coincides with.
+        // An outlier may replace a point with which it nearly coincides.
         assert!(right > 0.99, "{D}-D, {outliers} outliers: {right} right");
         assert_eq!(found.report.doubt(), None, "{D}-D, {outliers} outliers");
-        // The spline goes through one point in three; between them the field is smooth on the scale
+        // The spline interpolates every third point. Between them the field is smooth on the scale
         // of their spacing.
         let between = scene.model.iter().zip(&scene.truth);
         let close = between.filter(|(p, t)| (found.warp.apply(p) - *t).norm() < 2e-3);
@@ -47,8 +47,8 @@ fn clean_sets_are_matched() {
     check_clean::<3>();
 }
 
-/// A bell over a nearly regular disc, moved by four broad bumps by a fifth of its radius: what slips
-/// along the surface explains it nearly as well.
+/// A bell over a nearly regular disc, displaced by four broad bumps by a fifth of its radius: a
+/// slip along the surface is nearly as good an explanation.
 #[test]
 fn surfaces_in_space_do_not_slip() {
     for n in [2000, 5000] {
@@ -83,7 +83,7 @@ fn surfaces_in_space_do_not_slip() {
     }
 }
 
-/// Each of a heap is a candidate for each: a million would take terabytes.
+/// Every point of a cluster is a candidate for every other: a million points would need terabytes.
 #[test]
 fn a_heap_in_one_place_is_refused() {
     let mut heap = scattered::<2>(POINTS, 33);
@@ -100,8 +100,9 @@ fn a_heap_in_one_place_is_refused() {
     ));
 }
 
-/// Noise of a spacing hides the pairs, and their density alone tells the field: what moves points
-/// along without crowding them does not show, so that not all points lie within three noise widths.
+/// Noise of a spacing hides the pairs, and only the density determines the field. Displacements
+/// that do not change the density are invisible, so that not all points lie within three noise
+/// widths.
 #[test]
 fn noise_of_a_spacing_leaves_the_field() {
     let noise = 0.015;
@@ -112,13 +113,13 @@ fn noise_of_a_spacing_leaves_the_field() {
     let rows = found.warped.iter().zip(&scene.truth);
     let within = rows.filter(|(w, t)| (*w - *t).norm() < 3.0 * noise).count();
     assert!(within as f64 > 0.85 * POINTS as f64, "{within} within");
-    // Pairs cannot be told, and the report says so.
+    // Pairs cannot be determined, and the report contains a doubt.
     assert!(found.report.doubt().is_some());
 }
 
-/// Noise of a tenth of the spacing, which is below what the patterns of clean sets need: nearly all
-/// points have a partner. Of random points some have a neighbour within three noise widths, and
-/// trade places with it.
+/// With noise of a tenth of the spacing, below the limit for patterns of clean sets, nearly all
+/// points have a partner. Some random points have a neighbour within three noise widths and are
+/// exchanged with it.
 #[test]
 fn noise_of_a_tenth_of_the_spacing_loses_no_pairs() {
     let noise = 0.1 * (POINTS as f64).powf(-1.0 / 3.0);

@@ -1,4 +1,4 @@
-//! The tests of `tactile-match`, in one program: the generic code is compiled once for all of them.
+//! The tests of `tactile-match`, in a single program, so that the generic code is compiled once.
 
 mod allocation;
 mod common;

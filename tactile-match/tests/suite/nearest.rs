@@ -1,11 +1,11 @@
-//! Nearest neighbours: the greatest distance of a pair.
+//! Nearest neighbours: the largest distance of a pair.
 
 use nalgebra::Point2;
 use tactile_match::{Matching, NearestNeighbour, PointMatcher};
 
 fn partners(matcher: NearestNeighbour) -> Vec<Option<usize>> {
     let model = [[0.0, 0.0], [4.0, 0.0], [0.0, 4.0], [9.0, 9.0]].map(Point2::from);
-    // Away from the first three model points by 0.5, 2 and 3.5.
+    // Distances of 0.5, 2 and 3.5 from the first three model points.
     let target = [[0.3, 0.4], [4.0, -2.0], [0.0, 7.5]].map(Point2::from);
     let matching: Matching<2> = matcher.match_points(&model, &target).unwrap();
     matching.assignment

@@ -1,9 +1,9 @@
-//! Recorded answers: what every matcher returned on small scenes when the numbers were last meant
-//! to change.
+//! Recorded results of every matcher on small scenes.
 //!
-//! A change that is to leave the numbers alone passes. One that is to change them writes the record
-//! anew with `RECORD_ANSWERS=1 cargo test -p tactile-match --test suite recorded` and shows the
-//! difference in review.
+//! A change that is not meant to change results must pass. After a change that is meant to change
+//! them, rewrite the record with
+//! `RECORD_ANSWERS=1 cargo test -p tactile-match --test suite recorded`; the difference is visible
+//! in the review.
 
 use crate::common::{Stream, bend, reordered, rotation, scattered};
 use nalgebra::{Point, Point2, SVector};
@@ -21,7 +21,7 @@ struct Scene<const D: usize> {
     target: Vec<Point<f64, D>>,
 }
 
-/// The scenes that every matcher is recorded on.
+/// The scenes recorded for every matcher.
 fn scenes<const D: usize>() -> Vec<Scene<D>> {
     let mut stream = Stream::new(11);
     let model = scattered::<D>(50, 12);
@@ -53,7 +53,7 @@ fn scenes<const D: usize>() -> Vec<Scene<D>> {
     .into()
 }
 
-/// A jittered sunflower's disc, turned a little: parts of it settle one point aside at first.
+/// A jittered sunflower disc, slightly rotated: parts of it are at first displaced by one point.
 fn dense_scene() -> Scene<2> {
     let mut stream = Stream::new(13);
     let model: Vec<Point2<f64>> = (0..600)
@@ -72,8 +72,8 @@ fn dense_scene() -> Scene<2> {
     }
 }
 
-/// Numbers that change when anything in an answer does: the counts and the report as they are, of
-/// the arrays their sums with weights that tell the rows apart.
+/// Numbers that depend on every part of a result: the counts and the report themselves, and
+/// weighted sums of the arrays that depend on the order of rows.
 fn digest<const D: usize>(answers: &mut Answers, name: &str, found: &Matching<D>) {
     let weight = |i: usize| (1.0 + i as f64).sin();
     let sum = |values: &mut dyn Iterator<Item = f64>| -> f64 {
@@ -145,8 +145,7 @@ fn of_dimension<const D: usize>(answers: &mut Answers) {
     }
 }
 
-/// Points have coordinates of size one: sums of a few hundred of them in another order differ by
-/// less.
+/// Coordinates are of size one: sums of a few hundred of them in another order differ by less.
 const TOLERANCE: f64 = 1e-12;
 
 #[test]

@@ -8,8 +8,8 @@ const POINTS: usize = 80;
 const TURN: f64 = 0.4;
 const SCALE: f64 = 1.3;
 
-/// A model, its turned and shifted (and for a similarity enlarged) image, and that image shuffled,
-/// with noise and outliers.
+/// A model and its rotated and shifted image (scaled for a similarity), which is shuffled, with
+/// noise and outliers.
 fn scene<const D: usize>(
     transformation: Transformation,
     noise: f64,
@@ -50,8 +50,8 @@ fn check_motion<const D: usize>(
         let right = scene.right(&found.assignment);
         let case = format!("{D}-D, {transformation:?}, noise {noise}, {outliers} outliers");
         assert!(right as f64 > 0.95 * POINTS as f64, "{case}");
-        // The thin-plate spline through points that moved so is that motion, to the rounding of its
-        // system.
+        // The thin-plate spline through rigidly displaced points is that displacement, within the
+        // rounding of its system.
         let jacobian = found.warp.jacobian(&scene.model[0]);
         let size = (jacobian.transpose() * jacobian)[(0, 0)].sqrt();
         let shape = jacobian.transpose() * jacobian / (size * size);
@@ -82,7 +82,7 @@ fn motions_are_recovered() {
     check_motion::<3>(Transformation::Similarity, SCALE.powi(3), &scenes);
 }
 
-/// Over many noises the squared errors are what the covariances say.
+/// Over many draws of the noise, the squared errors agree with the covariances.
 fn check_variances<const D: usize>(transformation: Transformation) {
     let (mut squares, mut variances) = (0.0, 0.0);
     for seed in 0..40 {
@@ -94,8 +94,8 @@ fn check_variances<const D: usize>(transformation: Transformation) {
         }
     }
     let ratio = squares / variances;
-    // Forty scenes of three to seven parameters: their mean square varies by an eighth; the noise
-    // that is estimated adds to it.
+    // Forty scenes of three to seven parameters: their mean square varies by an eighth, and the
+    // estimated noise adds to it.
     assert!(
         (0.65..1.5).contains(&ratio),
         "{D}-D, {transformation:?}: {ratio}"
@@ -110,7 +110,7 @@ fn covariances_are_those_of_the_motion() {
     check_variances::<3>(Transformation::Similarity);
 }
 
-/// What no rigid motion explains stays in the residuals. The shape does not change.
+/// Displacements that are not rigid remain in the residuals. The shape does not change.
 #[test]
 fn shapes_are_kept() {
     let model = scattered::<2>(POINTS, 43);

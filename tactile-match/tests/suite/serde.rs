@@ -1,4 +1,4 @@
-//! What can be written can be read again, under stable names.
+//! Serialised values can be deserialised, with stable names.
 use tactile_match::{
     Doubt, Judgement, MatchReport, Outliers, Rotation, Search, SoftMatches, StopReason,
 };

@@ -1,13 +1,14 @@
-//! The fast matcher on tracked particles of a stretched volume and plane (data of
-//! FranckLab/SerialTrack, MIT, Jin Yang 2022), of which some leave the field of view and others
-//! enter: at least 99 % of the true pairs found, under half a percent wrong.
+//! The default matcher on tracked particles of a stretched volume and plane (data of
+//! FranckLab/SerialTrack, MIT, Jin Yang 2022). Some particles leave the field of view and others
+//! enter. At least 99 % of the true pairs must be found, and less than half a per cent of the pairs
+//! may be wrong.
 #![allow(clippy::print_stdout)] // what was found, beside the bars
 
 use crate::common::{Stream, reordered};
 use nalgebra::Point;
 use tactile_match::{AnnealedSoftassign, PointMatcher};
 
-/// Rows of `C` numbers. None where the file is not there. The line of names is no row.
+/// Rows of `C` numbers, without the header line. `None` if the file is absent.
 fn read<const C: usize>(file: &str) -> Option<Vec<[f64; C]>> {
     let path = test_support::published(&format!("serialtrack/{file}"))?;
     let text = std::fs::read_to_string(path).expect("readable");
@@ -22,8 +23,8 @@ fn read<const C: usize>(file: &str) -> Option<Vec<[f64; C]>> {
     Some(text.lines().filter_map(row).collect())
 }
 
-/// Matches frame 0 to frame `k`. Checks the shares of the true pairs found and of the pairs found
-/// that are wrong.
+/// Matches frame 0 to frame `k`. Checks the fraction of the true pairs that are found and the
+/// fraction of found pairs that are wrong.
 fn check<const D: usize>(kind: &str, k: usize) {
     let files = (
         read::<D>(&format!("{kind}_frame00.csv")),
@@ -64,7 +65,7 @@ fn check<const D: usize>(kind: &str, k: usize) {
     );
 }
 
-/// Frames stretched by 5, 10 and, in the volume, 25 percent.
+/// Frames stretched by 5, 10 and, in the volume, 25 per cent.
 #[test]
 fn stretched_particles_are_matched() {
     for k in [1, 2, 5] {

@@ -1,4 +1,4 @@
-//! Matches that begin where the last one ended find what a match made anew finds.
+//! Matches that start from the last result agree with new matches.
 
 use nalgebra::{Point2, Point3, Vector3};
 use tactile_match::{
@@ -6,7 +6,7 @@ use tactile_match::{
     Search, WarmStart,
 };
 
-/// A number of (−1, 1), without pattern and the same on every machine.
+/// A pseudo-random number in (−1, 1), the same on every machine.
 fn scatter(i: usize, k: usize) -> f64 {
     2.0 * ((i * i) as f64 * 0.618_033_988_75 + (i * (k + 1)) as f64 * 0.754_877_666_25).fract()
         - 1.0
@@ -21,7 +21,8 @@ fn dome(n: usize) -> Vec<Point3<f64>> {
     (0..n).map(place).collect()
 }
 
-/// Frame `k` of a rising load: larger, a little moved, every point off by up to `noise`.
+/// Frame `k` of an increasing load: larger, slightly displaced, and with noise of up to `noise` per
+/// point.
 fn frame(model: &[Point3<f64>], k: usize, noise: f64) -> Vec<Point3<f64>> {
     let growth = 1.0 + 0.02 * k as f64;
     let shift = Vector3::new(0.01 * k as f64, -0.004 * k as f64, 0.0);
@@ -53,8 +54,8 @@ fn a_series_agrees_with_matches_made_anew() {
             let target = frame(&model, k, noise);
             let next = near().match_next(&mut warm, &model, &target).unwrap();
             let anew = near().match_points(&model, &target).unwrap();
-            // Both stop when the temperature moves by a ten-thousandth; what is left is a small
-            // part of the noise.
+            // Both stop when the temperature changes by a ten-thousandth. The remaining difference
+            // is a small fraction of the noise.
             agree(&next, &anew, 1e-12 + 0.03 * noise);
 
             saved += anew
@@ -62,13 +63,13 @@ fn a_series_agrees_with_matches_made_anew() {
                 .iterations
                 .saturating_sub(next.report.iterations);
         }
-        // Six runs of about eleven iterations, four fewer each.
+        // Six runs of about eleven iterations, each with four fewer.
         assert!(saved >= 18, "{saved} iterations saved");
     }
 }
 
-/// `Near` leaves out the other starts and the average over scales: on the sets it is meant for it
-/// finds every partner, and the thorough search's warp.
+/// `Near` omits the other starts and the average over scales. On suitable sets it finds every
+/// partner and the warp of the thorough search.
 #[test]
 fn a_near_search_finds_what_a_thorough_one_finds() {
     let model = dome(150);
@@ -80,12 +81,12 @@ fn a_near_search_finds_what_a_thorough_one_finds() {
                 .match_points(&model, &target)
                 .unwrap();
             assert_eq!(found.assignment, (0..150).map(Some).collect::<Vec<_>>());
-            // The thorough search is the more careful: of a hundred noisy points it may leave one
+            // The thorough search is more cautious: it may leave one of a hundred noisy points
             // without a partner.
             let pairs = found.assignment.iter().zip(&thorough.assignment);
             assert!(pairs.filter(|(a, b)| a != b).count() <= 2);
             for (a, b) in found.warped.iter().zip(&thorough.warped) {
-                // Each is no farther off than a corner of the noise's cube, √3 of its half side.
+                // Each is within the noise cube, √3 of its half side.
                 assert!(
                     (a - b).norm() < 1e-12 + 2.0 * 3_f64.sqrt() * noise,
                     "{a} {b}"
@@ -125,7 +126,7 @@ fn another_model_has_no_past() {
     let next = near().match_next(&mut warm, &other, &target).unwrap();
     let anew = near().match_points(&other, &target).unwrap();
     agree(&next, &anew, f64::MIN_POSITIVE);
-    // The first model in turn is forgotten: its match takes what a cold one does.
+    // The first model is forgotten: its match needs the iterations of a cold one.
     let target = frame(&one, 3, 0.0);
     let again = near().match_next(&mut warm, &one, &target).unwrap();
     assert_eq!(again.report, first.report);
@@ -139,7 +140,7 @@ fn an_error_leaves_the_state_as_it_was() {
     assert!(near().match_next(&mut warm, &model, &[]).is_err());
     let nan = [Point3::new(f64::NAN, 0.0, 0.0)];
     assert!(near().match_next(&mut warm, &model, &nan).is_err());
-    // Nor does another model that cannot be matched leave anything of its own.
+    // Another model that cannot be matched leaves no trace either.
     assert!(near().match_next(&mut warm, &dome(70), &[]).is_err());
     let next = near().match_next(&mut warm, &model, &target).unwrap();
     assert!(next.report.iterations < first.report.iterations);
@@ -183,7 +184,7 @@ fn every_matcher_keeps_its_own_state() {
         boxed.match_next(&mut warm, &model, &target).unwrap();
     }
     assert_eq!(*warm.state::<usize>(), 3);
-    // Matchers without a state match anew and leave the other's alone.
+    // Matchers without a state match anew and do not affect the state of another matcher.
     let matchers: [&dyn PointMatcher<2>; 2] =
         [&LinearAssignment::default(), &CoherentPointDrift::default()];
     for matcher in matchers {
@@ -192,7 +193,7 @@ fn every_matcher_keeps_its_own_state() {
         assert_eq!(next.warped, anew.warped);
     }
     assert_eq!(*warm.state::<usize>(), 3);
-    // Another matcher with one starts cold.
+    // Another matcher with a state starts cold.
     let found = AnnealedSoftassign::default().match_next(&mut warm, &model, &target);
     assert!(found.is_ok() && *warm.state::<usize>() == 0);
 }

@@ -1,13 +1,13 @@
-//! Every matcher far from size one and from the origin, on points that nearly coincide or lie in a
-//! plane, and in single precision.
+//! Every matcher with sizes far from one, far from the origin, on points that nearly coincide or
+//! lie in a plane, and in single precision.
 
 use crate::common::{Scene, largest_step, matched, matchers};
 use nalgebra::{Point, Point3, SVector};
 
 const POINTS: usize = 40;
 
-/// The answer must scale with the points. Powers of ten round every coordinate: the input differs
-/// by the scalar's epsilon, which iterations and ill-conditioned splines enlarge by up to `growth`.
+/// The result must scale with the points. Powers of ten round every coordinate: the input differs
+/// by the scalar's epsilon, which iterations and ill-conditioned splines amplify by up to `growth`.
 fn check_scale<const D: usize>(growth: f64) {
     let scene = Scene::<D>::bent(POINTS, 0.03, 1);
     for (name, matcher) in matchers::<D>() {
@@ -40,7 +40,7 @@ fn the_scale_does_not_matter_in_double_precision() {
 fn an_offset_of_a_million_diameters_does_not_matter() {
     fn check<const D: usize>() {
         let scene = Scene::<D>::bent(POINTS, 0.03, 2);
-        // A power of two keeps what is lost to rounding at 2⁻³³ of the diameter.
+        // A power of two keeps the rounding errors at 2⁻³³ of the diameter.
         let offset = SVector::<f64, D>::repeat(f64::from(1 << 20));
         let moved =
             |points: &[Point<f64, D>]| points.iter().map(|p| p + offset).collect::<Vec<_>>();
@@ -70,7 +70,7 @@ fn sets_far_apart_are_matched() {
         .collect();
     for (name, matcher) in matchers::<3>() {
         let matching = matched(name, &*matcher, &scene.model, &far);
-        // Nearest neighbours are the only matcher that goes by where the sets lie.
+        // Only nearest neighbours depend on the positions of the sets.
         if name != "nearest neighbour" {
             assert!(
                 scene.right(&matching.assignment) >= POINTS - 2,
@@ -95,8 +95,8 @@ fn a_nearly_flat_set_is_matched() {
         for (name, matcher) in matchers::<3>() {
             let name = format!("{name}, thickness {thickness}");
             let matching = matched(&name, &*matcher, &model, &target);
-            // Projecting a jittered cube brings points close to one another; most are still told
-            // apart by their plane positions.
+            // The projection of a jittered cube moves points close together. Most are still
+            // distinguished by their positions in the plane.
             assert!(
                 scene.right(&matching.assignment) >= POINTS / 2,
                 "{name}: {}",
@@ -138,7 +138,7 @@ fn near_duplicates_are_answered() {
                     matching.assignment[i].is_some_and(|j| scene.order[j % POINTS] == i % POINTS)
                 })
                 .count();
-            // Which of the two is no question of right or wrong.
+            // Which of the two is chosen does not matter.
             assert!(right >= POINTS, "{name}: {right} of {}", 2 * POINTS);
         }
     }

@@ -1,4 +1,4 @@
-//! What the matchers give beside their pairs: standard deviations, confidences, doubts.
+//! Additional results of the matchers: standard deviations, confidences and doubts.
 
 use crate::common::{Scene, Stream, bend, scattered};
 use nalgebra::{Point, Point2, SVector};
@@ -7,8 +7,8 @@ use tactile_match::{
     NearestNeighbour, PointMatcher, RelaxationLabelling, Rotation, Transformation,
 };
 
-/// Adds Gaussian noise and a share of uniform outliers to the true positions of the points that are
-/// `seen`, and shuffles them.
+/// Adds Gaussian noise and a fraction of uniform outliers to the true positions of the `seen`
+/// points, and shuffles them.
 fn scene<const D: usize>(
     model: Vec<Point<f64, D>>,
     truth: Vec<Point<f64, D>>,
@@ -29,12 +29,12 @@ fn matched<const D: usize>(scene: &Scene<D>) -> Matching<D> {
         .expect("good points")
 }
 
-/// Share of the points in sight that have their own partner.
+/// Fraction of the visible points with their own partner.
 fn right<const D: usize>(scene: &Scene<D>, found: &Matching<D>) -> f64 {
     scene.right(&found.assignment) as f64 / scene.order.len() as f64
 }
 
-/// 105 points, bent, with noise of a fifth of their distance.
+/// 105 points, bent, with noise of a fifth of their spacing.
 fn noisy<const D: usize>(seed: u64, outliers: f64) -> Scene<D> {
     let model = scattered::<D>(105, seed);
     let truth = bend(&model, 0.06);
@@ -42,8 +42,9 @@ fn noisy<const D: usize>(seed: u64, outliers: f64) -> Scene<D> {
     scene(model, truth, |_| true, (noise, outliers), seed + 1000)
 }
 
-/// Share of the coordinates within one standard deviation of the truth, and the calibration of the
-/// confidences: for every tenth, how many pairs, the sum of their confidences, how many are right.
+/// Fraction of the coordinates within one standard deviation of the true values, and the
+/// calibration of the confidences: for every tenth, the number of pairs, the sum of their
+/// confidences, and the number of correct pairs.
 fn trust<const D: usize>(outliers: f64) -> (f64, [[f64; 3]; 10]) {
     let (mut within, mut all) = (0, 0);
     let mut tenths = [[0.0; 3]; 10];
@@ -70,15 +71,15 @@ fn trust<const D: usize>(outliers: f64) -> (f64, [[f64; 3]; 10]) {
 
 fn check_trust<const D: usize>(outliers: f64) {
     let (within, tenths) = trust::<D>(outliers);
-    // Sixteen smooth fields of some twenty modes each: their share varies by 3 % about the 68 % of
-    // a normal distribution.
+    // Sixteen smooth fields with about twenty modes each: their fraction varies by 3 % about the 68
+    // % of a normal distribution.
     assert!(
         (0.60..0.76).contains(&within),
         "{D}-D: {within} within one standard deviation"
     );
     let total = |column: usize| tenths.iter().map(|tenth| tenth[column]).sum::<f64>();
-    // Confidences also allow for parts that lie aside, which these scenes have none of: 2 to 4 %
-    // too low.
+    // Confidences also allow for displaced parts, which do not occur in these scenes: they are too
+    // low by 2 to 4 %.
     assert!(
         (total(1) - total(2)).abs() < 0.04 * total(0),
         "{D}-D: confidence {} in all, {} of {} pairs are right",
@@ -87,8 +88,9 @@ fn check_trust<const D: usize>(outliers: f64) {
         total(0)
     );
     for [count, confidence, right] in tenths {
-        // Over all kinds of scenes they are closer (`--example confidence`); ten points for one
-        // kind, and what the share of so few pairs varies by.
+        // Over all kinds of scenes the agreement is better (`--example confidence`). Ten points are
+        // allowed for one kind, plus the statistical variation of the fraction for this number of
+        // pairs.
         if count > 100.0 {
             let chance = 0.5 / f64::sqrt(count);
             assert!(
@@ -113,8 +115,9 @@ fn standard_deviations_and_confidences_are_honest_in_space() {
     check_trust::<3>(0.2);
 }
 
-/// Noise between the rounding of clean data and what the annealing resolves: no true pair is
-/// rejected, the noise is found, and the warp is nearer to the truth than the noisy points are.
+/// Noise between the rounding of clean data and the resolution of the annealing: no true pair is
+/// rejected, the noise is determined, and the warp is closer to the true positions than the noisy
+/// points.
 fn check_small_noise<const D: usize>(n: usize, size: f64) {
     for noise in [1e-5, 3e-4, 1e-3, 2e-3] {
         let (mut found_noise, mut squares) = (0.0, 0.0);
@@ -132,7 +135,7 @@ fn check_small_noise<const D: usize>(n: usize, size: f64) {
             found_noise += found.report.sigma / 4.0;
             squares += scene.error(&found.warped).powi(2) / 4.0;
         }
-        // Four sets of n points, of whose coordinates the warp takes up to two thirds: 2 to 5 %.
+        // Four sets of n points. The warp uses up to two thirds of their coordinates: 2 to 5 %.
         assert!(
             (found_noise / noise - 1.0).abs() < 0.15,
             "{D}-D, {n} points: noise {found_noise} for {noise}"
@@ -165,7 +168,7 @@ fn noise_of_few_points_costs_no_pair() {
         // One pair in fifty may be exchanged: the noise is a twentieth of the spacing.
         assert!(right(&scene, &found) >= 0.98, "seed {seed}");
         assert!(found.unmatched_model.is_empty(), "seed {seed}");
-        // 150 coordinates less what the warp takes, two standard deviations and more.
+        // 150 coordinates minus those used by the warp, and at least two standard deviations.
         assert!(
             (found.report.sigma / 0.015 - 1.0).abs() < 0.25,
             "seed {seed}: noise {}",
@@ -174,7 +177,7 @@ fn noise_of_few_points_costs_no_pair() {
     }
 }
 
-/// A set stretched along x and seen through its old window.
+/// A set stretched along x and seen through the original window.
 fn stretched<const D: usize>(n: usize, stretch: f64, outliers: f64, seed: u64) -> Scene<D> {
     let model = scattered::<D>(n, seed);
     let truth: Vec<_> = model
@@ -190,8 +193,8 @@ fn stretched<const D: usize>(n: usize, stretch: f64, outliers: f64, seed: u64) -
     scene(model, truth, in_window, (noise, outliers), seed + 7)
 }
 
-/// Of 24 scenes at most one has less than 98 % of its pairs: in a plane stretched by a quarter a
-/// part may stay one point aside.
+/// At most one of 24 scenes has less than 98 % of its pairs: in a plane stretched by a quarter, a
+/// part may be displaced by one point.
 #[test]
 fn stretched_and_cropped_sets_are_matched() {
     let mut short = Vec::new();
@@ -215,8 +218,8 @@ fn stretched_and_cropped_sets_are_matched() {
     );
 }
 
-/// A lattice looks the same after half a turn, a quarter and none: where any rotation is allowed
-/// nothing decides between them. A point that sticks out does.
+/// A lattice is unchanged by a rotation of a half or a quarter: if any rotation is allowed, the
+/// result is ambiguous. A protruding point decides.
 #[test]
 fn a_lattice_that_may_be_turned_is_doubtful() {
     let lattice: Vec<Point2<f64>> = (0..36)
@@ -241,9 +244,9 @@ fn a_lattice_that_may_be_turned_is_doubtful() {
     }
 }
 
-/// A jittered grid that was turned or mirrored has a match with itself near by, whose residuals are
-/// the jitter. Turns are found where they are allowed, and named where they are not. A mirror image
-/// is named. Without either there is no doubt.
+/// A rotated or mirrored jittered grid has a nearby match with itself, whose residuals are the
+/// jitter. Rotations are found if they are allowed, and otherwise named in a doubt. A mirror image
+/// is named. An unchanged grid has no doubt.
 #[test]
 fn a_jittered_grid_is_told_from_its_twins() {
     let mut stream = Stream::new(17);
@@ -279,8 +282,8 @@ fn a_jittered_grid_is_told_from_its_twins() {
     }
 }
 
-/// Pairs that come without a likelihood are judged by whether neighbours move together: sets a
-/// little bent are sure, sets that have nothing to do with each other are doubted.
+/// Pairs without a likelihood are judged by the common displacement of neighbours: slightly bent
+/// sets are certain, and unrelated sets are doubted.
 fn check_pairs<const D: usize>() {
     let matchers: [&dyn PointMatcher<D>; 4] = [
         &NearestNeighbour::default(),
@@ -313,7 +316,7 @@ fn check_pairs<const D: usize>() {
 fn pairs_alone_are_judged_by_the_motions_of_neighbours() {
     check_pairs::<2>();
     check_pairs::<3>();
-    // A lattice that moved by six tenths of a step: its nearest neighbours are the wrong ones.
+    // A lattice displaced by six tenths of a step: its nearest neighbours are wrong.
     let lattice = |shift: f64| -> Vec<Point2<f64>> {
         let place = |k: u32| Point2::new(f64::from(k % 12) + shift, f64::from(k / 12));
         (0..144).map(place).collect()

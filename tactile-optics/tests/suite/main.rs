@@ -1,5 +1,4 @@
-//! The tests of `tactile-optics`, in one program: the generic code is compiled once for all of
-//! them.
+//! The tests of `tactile-optics`, in a single program, so that the generic code is compiled once.
 
 mod paper;
 mod recorded;

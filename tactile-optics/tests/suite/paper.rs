@@ -1,4 +1,4 @@
-//! The paper's numbers (§2.2, §3.4, Table 1), and published indices of the materials.
+//! The numbers of the paper (§2.2, §3.4, Table 1), and published indices of the materials.
 use tactile_optics::{
     Dispersion, OpticsError, SensorParameters, SensorSpecification, acceptance_angle, led_cone,
 };
@@ -53,8 +53,8 @@ fn the_specification() {
     let sensor = SensorSpecification::new(&camera, 3.0).unwrap();
     assert_eq!(sensor.grid_elements.round(), 6452.0);
     assert_eq!(sensor.temporal_resolution_s, 12.5e-3);
-    // 0.76 grey levels over 1.45 million pixels and a reference as noisy: 1300 grey levels, 0.11
-    // mN.
+    // 0.76 grey levels over 1.45 million pixels, with equal noise of the reference: 1300 grey
+    // levels, 0.11 mN.
     let one_sigma = 0.76 * (2.0 * 1392.0 * 1042.0_f64).sqrt() * 8.7e-8;
     assert!((sensor.force_resolution_n - 3.0 * one_sigma).abs() < 1e-18);
     assert!((sensor.force_levels * 3.0 * one_sigma - 2.0).abs() < 1e-12);
@@ -66,7 +66,7 @@ fn the_specification() {
     assert!(refused(|p| p.side_m = 0.0) && refused(|p| p.frame_rate_hz = f64::INFINITY));
     assert!(refused(|p| p.pixel_noise_grey = f64::NAN));
     assert!(SensorSpecification::new(&camera, 0.0).is_err());
-    // A camera without noise is a limit worth asking for.
+    // A camera without noise is a valid limit.
     assert!(!refused(|p| p.pixel_noise_grey = 0.0));
 }
 
@@ -80,7 +80,7 @@ fn indices_and_abbe_numbers_of_the_materials() {
         assert!((d - index).abs() < tolerance);
         assert!(((d - 1.0) / (f - c) / abbe - 1.0).abs() < 0.02);
     }
-    // Tabulated values at 0.5 and 0.6 µm; the fits' residuals stay below 5.6e-4.
+    // Tabulated values at 0.5 and 0.6 µm. The residuals of the fits are below 5.6e-4.
     for (material, at_500, at_600) in [
         (Dispersion::PDMS_5_1, 1.40675, 1.40202),
         (Dispersion::PDMS_10_1, 1.39951, 1.39456),
@@ -90,11 +90,11 @@ fn indices_and_abbe_numbers_of_the_materials() {
         assert!((material.index(0.6e-6_f64).unwrap() - at_600).abs() < 5.6e-4);
     }
     assert!((Dispersion::PDMS_RTV615.index(0.6e-6).unwrap() - 1.4297).abs() < 1e-3);
-    // The published fit ends at 750 nm, on both sides nothing is extrapolated.
+    // The published fit ends at 750 nm. There is no extrapolation at either end.
     assert!(Dispersion::PDMS_10_1.index(0.3e-6_f64).is_err());
     assert!(Dispersion::PDMS_10_1.index(0.85e-6_f64).is_err());
     assert!(Dispersion::N_BK7.index(f64::NAN).is_err());
-    // Normal dispersion: the index falls with the wavelength.
+    // Normal dispersion: the index decreases with the wavelength.
     let falling = |m: Dispersion| {
         (400..700)
             .all(|nm| m.index(nm as f64 * 1e-9).unwrap() > m.index((nm + 1) as f64 * 1e-9).unwrap())

@@ -1,11 +1,10 @@
-//! Traces of an earlier state of this crate, so that a change of its form changes no number. The
-//! closed forms have numbers of 80 digits (`reference.rs`, `stability_scale.rs`) and the data of
-//! their materials (`paper.rs`).
+//! Traces of an earlier version of this crate. They ensure that a change of the implementation
+//! changes no number. The closed forms are compared with numbers of 80 digits (`reference.rs`,
+//! `stability_scale.rs`) and with the data of their materials (`paper.rs`).
 //!
-//! `tests/recorded/answers.txt` holds a line for every name. After a change that is meant to alter
-//! answers, write it anew with
-//! `RECORD_ANSWERS=1 cargo test -p tactile-optics --test suite recorded` and read the difference
-//! before committing.
+//! `tests/recorded/answers.txt` contains one line per name. After a change that is meant to change
+//! results, rewrite it with `RECORD_ANSWERS=1 cargo test -p tactile-optics --test suite recorded`
+//! and inspect the difference before committing.
 
 use test_support as record;
 
@@ -15,7 +14,7 @@ use tactile_optics::{Geometry, Led};
 
 const RECORDED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/recorded/answers.txt");
 
-/// Named numbers, in the order in which they were computed.
+/// Named numbers, in the order of their computation.
 #[derive(Default)]
 struct Answers {
     all: record::Answers,
@@ -92,10 +91,9 @@ fn answers_are_those_recorded() {
     let mut answers = Answers::default();
     traces(&mut answers);
     answers.all.check(RECORDED, |name, recorded, _| {
-        // A sum taken in another order moves the last digits.
+        // A sum in another order changes the last digits.
         let tolerance = 1e-12;
-        // Coordinates of a path that are zero up to rounding are compared as lengths of the slab's
-        // size.
+        // Coordinates of a path that are zero up to rounding are compared on the scale of the slab.
         let floor = if name.contains("path") { 1e-17 } else { 0.0 };
         tolerance * recorded.abs() + floor
     });

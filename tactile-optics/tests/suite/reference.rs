@@ -1,5 +1,5 @@
-//! Agreement with reference numbers computed to 80 digits. Skipped, with a line that says so, where
-//! they are absent.
+//! Agreement with reference numbers computed to 80 digits. If they are absent, the test is skipped
+//! and prints a line.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 use serde_json::Value;
 use tactile_optics::{
@@ -13,7 +13,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap()
 }
 
-/// Relative error; against zero, the absolute one.
+/// Relative error, or the absolute error if zero is expected.
 fn error(found: f64, expected: f64) -> f64 {
     if expected == 0.0 {
         found.abs()
@@ -22,7 +22,7 @@ fn error(found: f64, expected: f64) -> f64 {
     }
 }
 
-/// Largest error seen and number of values compared.
+/// Largest error and number of compared values.
 #[derive(Default)]
 struct Score {
     worst: f64,
@@ -122,8 +122,8 @@ fn check_fresnel(case: &Value, score: &mut Score) {
     let found = fresnel(n1, n2, theta).unwrap();
     let total = case["expected"]["status"].as_str() == Some("total");
     if found.refraction.is_none() != total {
-        // One ulp of the angle on either side of the critical one decides; the sine carries half an
-        // ulp of its own.
+        // One ulp of the angle on either side of the critical angle is decisive; the sine itself
+        // has half an ulp.
         assert!(
             (n1 * theta.sin() - n2).abs() < 2.0 * EPS * n2,
             "{what}: total {} against {total}",
@@ -176,7 +176,7 @@ fn tolerance(condition: f64) -> f64 {
     f64::max(1e-13, 10.0 * EPS * condition)
 }
 
-/// Part of the light passes: angle, transmittances and reflectances.
+/// A part of the light is transmitted: angle, transmittances and reflectances.
 fn check_partial(case: &Value, found: &Fresnel, score: &mut Score) {
     let (n1, n2, what) = (
         number(&case["n1"]),
@@ -195,7 +195,7 @@ fn check_partial(case: &Value, found: &Fresnel, score: &mut Score) {
     score.check(found.transmittance_s, value("Ts"), tolerance(grazing), what);
     score.check(found.transmittance_p, value("Tp"), tolerance(grazing), what);
     if n1 == n2 {
-        // No interface: the reference has the rounding of its own 80 digits.
+        // Without an interface the reference has the rounding of its 80 digits.
         assert_eq!(
             (found.reflectance_s, found.reflectance_p),
             (0.0, 0.0),
@@ -203,7 +203,7 @@ fn check_partial(case: &Value, found: &Fresnel, score: &mut Score) {
         );
         return;
     }
-    // R = 1 − T: where T is small, its error is an absolute one of R.
+    // R = 1 − T: if T is small, its error is an absolute error of R.
     let of_reflectance = |t: f64| tolerance(2.0 * grazing * t.min(1.0));
     score.check(
         found.reflectance_s,

@@ -1,4 +1,4 @@
-//! Digits kept near every edge; no allocation; properties over random inputs.
+//! Accuracy near every limit, no allocation, and properties for random inputs.
 use proptest::prelude::*;
 use tactile_optics::surface::Dimple;
 use tactile_optics::trace::{Slab, SlabLayer, TraceOptions, path, trace};
@@ -7,7 +7,7 @@ use tactile_optics::{
     propagation,
 };
 
-/// Whether n² ≥ 2m² for doubles that are whole multiples of 2⁻⁵², in 128-bit integers.
+/// Whether n² ≥ 2m² for doubles that are integer multiples of 2⁻⁵², in 128-bit integers.
 fn exactly_unlimited(n: f64, m: f64) -> bool {
     let whole = |x: f64| (x * 4_503_599_627_370_496.0) as u128;
     let (n, m) = (whole(n), whole(m));
@@ -29,7 +29,8 @@ fn reflectance_of_nearly_equal_media_is_the_square_of_the_step() {
 
 #[test]
 fn grazing_transmittance_is_linear_in_the_complement() {
-    // T_s → 4 n₁ c₁/√(n₂² − n₁²) as the angle nears π/2: halving the complement halves it.
+    // T_s → 4 n₁ c₁/√(n₂² − n₁²) as the angle approaches π/2: half the complement gives half the
+    // transmittance.
     let near = |c: f64| {
         fresnel(1.0, 1.4, std::f64::consts::FRAC_PI_2 - c)
             .unwrap()
@@ -95,8 +96,8 @@ fn a_path_stays_in_the_slab_and_ends_where_light_leaves() {
             .iter()
             .all(|v| v[2] <= 0.0 && v[2] >= -5e-3 - 1e-15)
     );
-    // In a slab of 1.2 a ray at 60° is beyond the acceptance angle of 41.6° and leaves at the top,
-    // which it meets first.
+    // In a slab of 1.2 a ray at 60° is beyond the acceptance angle of 41.6° and leaves through the
+    // top, which it reaches first.
     let thin = [SlabLayer {
         index: 1.2_f64,
         thickness_m: 5e-3,
@@ -174,8 +175,8 @@ proptest! {
         n1 in 1.0_f64..3.0, n2 in 1.0_f64..3.0, angle in 0.0_f64..1.57
     ) {
         let f = fresnel(n1, n2, angle).unwrap();
-        // R and T are computed apart; near the critical angle both are steep in the rounding of the
-        // sine they share.
+        // R and T are computed separately. Near the critical angle both depend strongly on the
+        // rounding of the common sine.
         prop_assert!((f.reflectance_s + f.transmittance_s - 1.0).abs() < 1e-13);
         prop_assert!((f.reflectance_p + f.transmittance_p - 1.0).abs() < 1e-13);
         prop_assert!(f.reflectance_p <= f.reflectance_s + 1e-15);
@@ -186,8 +187,9 @@ proptest! {
         let forth = fresnel(n1, n2, angle).unwrap();
         if let Some(refracted) = forth.refraction && refracted.complement > 1e-3 {
             let back = fresnel(n2, n1, refracted.radians).unwrap();
-            // Steep where either side grazes (the way back is then near its critical angle): the
-            // relative condition goes as the inverse square of the complement.
+            // Steep near grazing incidence on either side (the reverse path is then near its
+            // critical angle): the relative condition is proportional to the inverse square of the
+            // complement.
             let grazing = refracted.complement.min(std::f64::consts::FRAC_PI_2 - angle);
             let tolerance = 1e-14 / grazing.powi(2);
             prop_assert!((back.transmittance_s - forth.transmittance_s).abs() < tolerance);
@@ -208,7 +210,7 @@ proptest! {
         let acceptance = acceptance_angle(n, n0).unwrap();
         prop_assume!(acceptance.complement > 0.0);
         let critical = critical_angle(n, n0).unwrap().unwrap();
-        // Entering at θᵢ the ray travels at π/2 − θ_c to the axis.
+        // A ray that enters at θᵢ travels at π/2 − θ_c to the axis.
         let angle: Angle = propagation(n, n0 * acceptance.radians.sin()).unwrap().unwrap();
         prop_assert!((angle.radians - critical.complement).abs() < 1e-14);
     }
@@ -230,7 +232,7 @@ proptest! {
         let back = normal_incidence(&reversed, n0).unwrap();
         prop_assert!((forth.transmittance - back.transmittance).abs() < 1e-14);
         prop_assert!((forth.transmittance + forth.reflectance - 1.0).abs() < 1e-14);
-        // Light that comes back after several reflections adds to what passes.
+        // Light after several reflections adds to the transmitted light.
         prop_assert!(forth.transmittance >= forth.single_pass - 1e-15);
         // A layer cut in two is the same layer.
         let mut cut = indices.clone();

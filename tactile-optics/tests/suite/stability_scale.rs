@@ -1,5 +1,5 @@
-//! Angles at every scale and within a few units in the last place of the edges, against 80-digit
-//! numbers.
+//! Angles at every scale and within a few units in the last place of the limits, compared with
+//! 80-digit numbers.
 #![allow(clippy::print_stdout)]
 
 use test_support as worst;
@@ -7,8 +7,8 @@ use test_support as worst;
 use tactile_optics::{Angle, acceptance_angle, critical_angle};
 use worst::{Worst, cases};
 
-/// A dozen roundings, each of which the result follows at most once: differences of indices are
-/// taken before anything rounds.
+/// A dozen roundings, each of which affects the result at most once: differences of indices are
+/// computed before any rounding.
 const ALLOWED: f64 = 4.0;
 
 #[test]

@@ -1,4 +1,4 @@
-//! The ray tracer against closed forms, against slow obvious code, and against itself.
+//! The ray tracer compared with closed forms, with slow direct code, and with itself.
 #![allow(clippy::print_stdout)]
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -39,8 +39,8 @@ fn flat(layers: &[SlabLayer], length: f64, options: &TraceOptions) -> LightBudge
     trace(&slab, &Led::default(), &Flat, options, &mut []).unwrap()
 }
 
-/// Energy is conserved to rounding: a ray splits by `transmitted` and `power − transmitted`, the
-/// sums are compensated.
+/// Energy is conserved within rounding: a ray is split into `transmitted` and
+/// `power − transmitted`, and the sums are compensated.
 fn assert_conserved(budget: &LightBudget) {
     assert!((total(budget) - 1.0).abs() < 1e-13, "{budget:?}");
 }
@@ -49,13 +49,13 @@ fn total(b: &LightBudget) -> f64 {
     b.entry + b.guided + b.returned + leaked(b) + b.absorbed + b.unresolved
 }
 
-/// What left through top or bottom.
+/// Light that left through top or bottom.
 fn leaked(b: &LightBudget) -> f64 {
     b.above + b.below + b.camera
 }
 
-/// Guided share of one flat layer in a section by unfolding: a ray at angle θ outside makes ⌊…⌋
-/// reflections, each keeping the share R. Midpoints over start and angle.
+/// Guided fraction of one flat layer in a section by unfolding: a ray at angle θ outside has ⌊…⌋
+/// reflections, each with the reflectance R. Midpoints over starting point and angle.
 fn guided_by_unfolding(n: f64, thickness: f64, length: f64, steps: usize) -> f64 {
     let (mut guided, mut total) = (0.0, 0.0);
     for i in 0..steps {
@@ -88,17 +88,18 @@ fn a_flat_layer_guides_what_unfolding_says_and_the_error_falls_faster_than_with_
         ((0..16).map(|s| of_seed(s).powi(2)).sum::<f64>() / 16.0).sqrt()
     };
     let errors = [256, 4096, 65536].map(error);
-    // What is left are jumps in the number of reflections.
+    // The remaining errors are jumps in the number of reflections.
     assert!(errors[2] < 2e-5, "{errors:?}");
     println!("rms error of the guided share at 256, 4096, 65536 rays: {errors:?}");
-    // Random rays would gain a factor of 16 in all; even points gain more in each of the two steps.
+    // Random rays would reduce the error by a factor of 16 in total; even points reduce it more in
+    // each of the two steps.
     assert!(errors[0] / errors[2] > 64.0, "{errors:?}");
 }
 
 #[test]
 fn a_long_slab_keeps_the_trapped_share() {
-    // What enters within the acceptance angle stays for ever; of the rest, only rays within 1e-4
-    // rad of it are still on their way after 40 000 thicknesses.
+    // Light that enters within the acceptance angle is trapped. After 40 000 thicknesses, only rays
+    // within 1e-4 rad of that angle are left of the other light.
     let layer = [SlabLayer {
         index: 1.35,
         thickness_m: 1e-3,
@@ -113,9 +114,9 @@ fn a_long_slab_keeps_the_trapped_share() {
         let slab = Slab::new(&layer, 1.0, 1.0).unwrap();
         let found = trace(&slab, &led, &Flat, &options, &mut []).unwrap();
         assert_conserved(&found);
-        // The trapped rays' own losses at the entry differ from the mean: compare shares of
-        // lossless entry by an LED narrow enough that all of it is trapped, and the general one by
-        // its bound.
+        // The entry losses of the trapped rays differ from the mean. Fractions are therefore
+        // compared without losses, for an LED so narrow that all of its light is trapped. The
+        // general LED is compared with its bound.
         let share = led.trapped_share(acceptance, geometry);
         assert!(
             found.guided < share && found.guided > share * (1.0 - found.entry * 1.5),
@@ -140,7 +141,7 @@ fn closed_forms_of_the_trapped_share() {
     // The projected solid angle of a strip of the unit disc.
     let disc = 2.0 / PI * (s.asin() + s * (1.0 - s * s).sqrt());
     assert!((led.trapped_share(acceptance, Geometry::Volume) - disc).abs() < 1e-11);
-    // An even LED in space: the zone of a sphere.
+    // A uniform LED in space: a zone of a sphere.
     let even = Led::new(0.0, FRAC_PI_2).unwrap();
     assert!((even.trapped_share(acceptance, Geometry::Volume) - s).abs() < 1e-10);
     let dense = acceptance_angle(1.5, 1.0).unwrap();
@@ -169,8 +170,9 @@ fn energy_is_conserved_whatever_the_scene() {
             let mut profile = [0.0; 30];
             let budget = trace(&slab, &Led::default(), &touched, &options, &mut profile).unwrap();
             assert_conserved(&budget);
-            // Light gathers in the dense layers below and meets the inner interfaces near grazing,
-            // where it splits often: thousands of branches of 1e-7 or less a ray.
+            // Light accumulates in the dense layers below and meets the inner interfaces near
+            // grazing incidence, where it is often split: thousands of branches of at most 1e-7 per
+            // ray.
             assert!(budget.unresolved < 5e-4, "{budget:?}");
             assert!((profile.iter().sum::<f64>() - budget.camera).abs() < 1e-13);
             let again = trace(&slab, &Led::default(), &touched, &options, &mut profile).unwrap();
@@ -201,8 +203,8 @@ fn a_press_lights_up_the_camera_more_the_steeper_it_is_and_most_where_an_object_
         let object = TouchingObject { index, albedo: 0.8 };
         camera(&Touched::new(Flat, object, centre, 3e-3).unwrap())
     };
-    // An object of the ambient's index frees no trapped ray; the denser, the more light enters it
-    // and comes back.
+    // An object with the index of the ambient frees no trapped ray. With a higher index, more light
+    // enters it and is scattered back.
     assert!(touch(1.0) < flat + 0.02);
     assert!(
         touch(1.2) > touch(1.0) && touch(1.45) > touch(1.2),
@@ -216,7 +218,7 @@ fn a_press_lights_up_the_camera_more_the_steeper_it_is_and_most_where_an_object_
 
 #[test]
 fn mirror_images_shine_alike() {
-    // Mirroring y leaves the budget of a symmetric LED alone, to the sampling's error.
+    // Mirroring y does not change the budget of a symmetric LED, within the sampling error.
     let slab = Slab::new(&PAPER, 1.0, 30e-3).unwrap();
     let options = with_rays(40_000);
     let leaked_at = |y: f64| {
@@ -241,8 +243,8 @@ fn light_leaves_where_the_press_is() {
     let brightest = (0..30)
         .max_by(|&a, &b| profile[a].total_cmp(&profile[b]))
         .unwrap();
-    // Scattered 12 mm above the bottom within the camera's cone, light leaves some millimetres
-    // around the contact.
+    // Light scattered 12 mm above the bottom, within the cone of the camera, leaves within some
+    // millimetres of the contact.
     assert!((14..=22).contains(&brightest), "{profile:?}");
 }
 

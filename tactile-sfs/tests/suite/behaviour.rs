@@ -1,9 +1,9 @@
-//! What every implementation must do: reused workspaces, masks, float types, determinism,
-//! callbacks.
+//! Requirements for every implementation: reused workspaces, masks, floating-point types,
+//! determinism, callbacks.
 use crate::common::{Alignment, Sampled, errors, from_rim, integrators, reconstructions, sphere};
 use tactile_sfs::*;
 
-/// NaN-aware equality of the bits that matter.
+/// Equality of bits, with equal NaNs.
 fn same(a: &Surface<f64>, b: &Surface<f64>) -> bool {
     a.mask == b.mask
         && a.flags == b.flags
@@ -35,7 +35,7 @@ fn a_reused_workspace_changes_nothing_and_does_not_allocate() {
         let mut run = || method.integrate_with(&mut workspace, p, q, &domain, &mut surface);
         run().unwrap();
         let counted = allocation_counter::measure(|| run().unwrap());
-        // A sparse factorisation takes its memory anew.
+        // A sparse factorisation allocates its memory anew.
         if name != "least squares" {
             assert_eq!(counted.count_total, 0, "{name}");
         }
@@ -76,8 +76,8 @@ fn single_precision_agrees() {
         .reconstruct(Image::new(image.view(), domain))
         .unwrap();
     let error = errors(&narrow, &wide.heights, Alignment::None);
-    // cos² loses half the digits of f32 near 1: 10⁻³ of slope at worst near the peak, over a few
-    // pixels.
+    // cos² near 1 loses half of the digits of f32: at worst a slope error of 10⁻³ near the peak,
+    // over a few pixels.
     assert!(error.max < 2e-2, "{error:?}");
 }
 

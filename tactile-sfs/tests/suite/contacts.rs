@@ -1,5 +1,5 @@
-//! Contacts of few pixels in frames as a camera gives them: heights, and points that correspond
-//! from load to load.
+//! Contacts of few pixels in realistic camera frames: heights, and points that correspond between
+//! loads.
 
 use crate::common::from_rim;
 use ndarray::Array2;
@@ -8,9 +8,9 @@ use tactile_sfs::*;
 /// Grey levels of a full signal.
 const LEVELS: f64 = 200.0;
 
-/// The shading of a ball's contact, √(1 − ρ²) (1 − c ρ²) with ρ = r/a and c the bend, averaged over
-/// pixels, blurred by a lens (0.8 pixels) and rounded to grey levels; and the mask of the pixels
-/// that are brighter than a hemisphere's a quarter of a pixel inside its contour.
+/// The shading of the contact of a ball, √(1 − ρ²) (1 − c ρ²) with ρ = r/a and the bend c, averaged
+/// over pixels, blurred by a lens (0.8 pixels) and rounded to grey levels. The mask contains the
+/// pixels that are brighter than a hemisphere a quarter of a pixel inside its contour.
 fn contact(radius: f64, centre: [f64; 2], bend: f64) -> (Array2<f64>, Array2<bool>) {
     let side = (2.0 * radius) as usize + 12;
     let sub = 5;
@@ -59,7 +59,7 @@ fn surface(method: &Eikonal<f64>, radius: f64, centre: [f64; 2]) -> Surface<f64>
         .expect("a surface")
 }
 
-/// Mean error of the heights inside nine tenths of the radius, over the radius.
+/// Mean error of the heights inside nine tenths of the radius, relative to the radius.
 fn height_bias(method: &Eikonal<f64>, radius: f64, centre: [f64; 2]) -> f64 {
     let (mut sum, mut count) = (0.0, 0);
     for ((row, column), z) in surface(method, radius, centre).heights.indexed_iter() {
@@ -84,14 +84,14 @@ fn a_fitted_profile_keeps_the_height_of_small_contacts() {
             radius,
             centre,
         );
-        // What is left is the blur's part inside the ring and the rounding near the top, where half
-        // a grey level is a slope of 0.07: half a pixel in all.
+        // The remaining errors are the blur inside the ring and the rounding near the top, where
+        // half a grey level is a slope of 0.07: half a pixel in total.
         assert!(fitted.abs() < 0.5 / radius, "{radius}: {fitted}");
     }
 }
 
-/// Height of the middle, ∫ √(1/R² − 1) dr, by the midpoint rule in r = a sin φ, where the integrand
-/// stays finite.
+/// Height of the centre, ∫ √(1/R² − 1) dr, by the midpoint rule in r = a sin φ, for which the
+/// integrand is finite.
 fn middle_height(radius: f64, bend: f64) -> f64 {
     let step = std::f64::consts::FRAC_PI_2 / 4000.0;
     let slope = |k: i32| {
@@ -102,8 +102,8 @@ fn middle_height(radius: f64, bend: f64) -> f64 {
     radius * step * (0..4000).map(slope).sum::<f64>()
 }
 
-/// Pressures at finite strain, c from −0.3 to 0.15, start on their own contour: on the quadratic's
-/// the height at c = −0.3 is 2.8 % low.
+/// With pressures at finite strain, c from −0.3 to 0.15, the surface starts on their own contour.
+/// On the contour of the quadratic the height at c = −0.3 would be 2.8 % too low.
 #[test]
 fn a_bent_profile_keeps_the_height() {
     for bend in [-0.3, -0.1, 0.05] {
@@ -115,8 +115,8 @@ fn a_bent_profile_keeps_the_height() {
             .reconstruct(Image::new(image.view(), domain))
             .unwrap();
         let height = surface.heights[[66, 66]] / middle_height(radius, bend);
-        // Half a pixel of the blur, and half a grey level at the top: a slope of 0.07 over a tenth
-        // of the radius and more where it is flat.
+        // Half a pixel because of the blur, and half a grey level at the top: a slope of 0.07 over
+        // a tenth of the radius, or more if it is flat.
         assert!((height - 1.0).abs() < 0.02, "{bend}: {height}");
     }
 }
@@ -144,8 +144,8 @@ fn a_contact_that_is_no_ellipse_is_taken_as_it_is() {
     );
 }
 
-/// Stretch along z between the points of two loads, by least squares over the nearest points, over
-/// that of the radii.
+/// Stretch along z between the points of two loads, by least squares over the nearest points,
+/// relative to that of the radii.
 fn stretch(sampler: &dyn ControlPointSampler<f64>, radii: [f64; 2], centre: [f64; 2]) -> f64 {
     let method = from_rim(Lighting::<f64>::default()).with_fitted_profile(true);
     let [small, large] = radii.map(|radius| {
@@ -184,9 +184,9 @@ fn points_of_small_contacts_correspond_from_load_to_load() {
         let radii = [19.0, 19.0 * 1.197];
         let contour = stretch(&ContactSampler, radii, centre);
         let pixels = stretch(&EquallySpaced, radii, centre);
-        // Points that do not correspond make the stretch too small. Height rises as the root of the
-        // distance from the contour: a quarter of a pixel there is three of height, which no
-        // sampler gets rid of in contacts of 19 pixels.
+        // Points that do not correspond reduce the stretch. Height is proportional to the square
+        // root of the distance from the contour: a quarter of a pixel there is three pixels of
+        // height, which no sampler avoids in contacts of 19 pixels.
         assert!((contour - 1.0).abs() < 0.08, "{centre:?}: {contour}");
         assert!(
             (contour - 1.0).abs() < 0.75 * (pixels - 1.0).abs(),
@@ -219,8 +219,8 @@ fn contact_points_lie_inside_the_contour() {
         for point in &points {
             let r2 = (point.y - centre[0]).powi(2) + (point.x - centre[1]).powi(2);
             let height = (radius * radius - r2).max(0.0).sqrt();
-            // Squares are interpolated linearly: off by a quarter of a squared pixel at most, at
-            // the contour by a root of that.
+            // Squares are interpolated linearly, with an error of at most a quarter of a squared
+            // pixel, and at the contour of its square root.
             assert!((point.z * point.z - height * height).abs() < 1.0, "{point}");
         }
     }

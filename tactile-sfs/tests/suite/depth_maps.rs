@@ -20,8 +20,8 @@ fn means_of_blocks_are_those_of_their_pixels() {
     for (side, shape) in [(3, (2, 3)), (1, (8, 9)), (4, (2, 2))] {
         contact.load(images, side, -2.0);
         assert_eq!(contact.signal.dim(), shape);
-        // The mean of a linear function is its value in the block's middle. All sums are exact in
-        // f64.
+        // The mean of a linear function is its value in the centre of the block. All sums are exact
+        // in f64.
         let middle =
             |start: usize, block: usize| (start + side * block) as f64 + 0.5 * (side as f64 - 1.0);
         for ((r, c), mean) in contact.signal.indexed_iter() {
@@ -53,11 +53,11 @@ fn pixels_too_near_the_rim_of_a_hemisphere_are_trimmed() {
     contact.signal = Array2::from_shape_fn((50, 50), |at| {
         (1.0 - (distance(at) / 20.0).powi(2)).max(0.0).sqrt()
     });
-    // A blur's light reaches half a pixel beyond the rim.
+    // The light of a blur extends half a pixel beyond the rim.
     contact.mask = Array2::from_shape_fn((50, 50), |at| distance(at) < 20.5);
     contact.trim_rim();
     for (at, inside) in contact.mask.indexed_iter() {
-        // The radius from the pixels is half a pixel too large at most: a fortieth of the quarter
+        // The radius from the pixels is at most half a pixel too large: a fortieth of the quarter
         // pixel.
         let inner = 20.0 - distance(at);
         assert!(*inside || inner < 0.26, "{at:?}: {inner}");
@@ -78,7 +78,8 @@ fn smoothing_keeps_lines_and_sums() {
     let mut contact = BinnedContact::default();
     contact.signal = plane.clone();
     contact.smooth(5, |_| 1.0);
-    // Away from the edge a box mean of a linear function is the function, to rounding.
+    // Away from the edge the moving average of a linear function is the function itself, within
+    // rounding.
     assert!((contact.signal[[10, 15]] - plane[[10, 15]]).abs() < 1e-12);
     contact.signal = Array2::zeros((21, 21));
     contact.signal[[10, 10]] = 1.0;
@@ -108,7 +109,7 @@ fn an_exact_cap_comes_back() {
     let mask = heights.mapv(|h| h > 0.0);
     let domain = Domain::new(size).unwrap().with_mask(mask.view());
     let known = BallFit::of_radius(heights.view(), &domain, radius).unwrap();
-    // Gauss–Newton stops at 10⁻⁹ of the radius, the search for a radius at a millionth of its
+    // Gauss–Newton stops at 10⁻⁹ of the radius, and the search for a radius at a millionth of its
     // bracket.
     for (fit, tolerance) in [
         (known, 1e-10),

@@ -1,5 +1,5 @@
-//! Input that is hard or wrong: bad pixels, noise at the rim, domains one pixel wide, options and
-//! shapes that make no sense.
+//! Difficult or invalid input: defective pixels, noise at the rim, domains one pixel wide,
+//! meaningless options and shapes.
 use crate::common::{Alignment, Sampled, errors, from_rim, integrators, reconstructions, sphere};
 use ndarray::Array2;
 use tactile_sfs::*;
@@ -29,8 +29,8 @@ fn bad_pixels_are_flagged_and_do_little_harm() {
 
 #[test]
 fn noise_at_the_rim_does_not_draw_the_surface_down() {
-    // The solution is a minimum over all rim pixels; with each judged alone, grey levels with a
-    // noise of one lose 4 % here.
+    // The solution is a minimum over all rim pixels. If each were judged alone, grey levels with a
+    // noise of one would reduce the height by 4 %.
     let (radius, mut state) = (60.0_f64, 7_u64);
     let mut uniform = || {
         state = state
@@ -53,7 +53,7 @@ fn noise_at_the_rim_does_not_draw_the_surface_down() {
         .reconstruct(Image::new(image.view(), domain))
         .unwrap();
     let error = errors(&surface, &z, Alignment::None);
-    // 0.8 % of the radius for this seed; the bound leaves the spread of other seeds.
+    // 0.8 % of the radius for this seed. The bound allows for the variation between seeds.
     assert!(error.mean_absolute < 0.012 * radius, "{error:?}");
 }
 
@@ -75,7 +75,7 @@ fn narrow_domains_are_right() {
             .integrate(p.view(), q.view(), &Domain::default())
             .unwrap();
         let rise = surface.heights[[0, 7]] - surface.heights[[0, 0]];
-        // The periodic method cannot hold a ramp: its mean slope is lost.
+        // The periodic method cannot represent a ramp: its mean slope is lost.
         let expected = if name == "frankot-chellappa" {
             0.0
         } else {

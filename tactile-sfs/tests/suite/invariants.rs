@@ -1,13 +1,12 @@
-//! Properties that hold for any contact: where it lies in the frame and what is outside its mask do
-//! not matter; and the estimates and error functions against cases worked out by hand.
+//! Properties of every contact: its position in the frame and the values outside its mask do not
+//! matter. The estimates and error functions are compared with cases calculated by hand.
 
 use crate::common::{integrators, reconstructions};
 use ndarray::{Array2, s};
 use proptest::prelude::*;
 use tactile_sfs::*;
 
-/// A lumpy frame, its slopes and a mask of the given ellipse, all placed at (top, left) of a larger
-/// frame.
+/// An uneven frame, its slopes and an elliptical mask, all placed at (top, left) of a larger frame.
 struct Placed {
     image: Array2<f64>,
     p: Array2<f64>,
@@ -45,7 +44,7 @@ impl Placed {
         }
     }
 
-    /// Heights in the patch by every method.
+    /// Heights of the placed frame by every method.
     fn heights(&self, [top, left]: [usize; 2]) -> Vec<(&'static str, Array2<f64>)> {
         let domain = Domain::default().with_mask(self.mask.view());
         let light = Lighting::new([0.3, -0.2, 1.0]).unwrap();
@@ -88,7 +87,7 @@ proptest! {
         let here = Placed::new(PATCH, [0, 0], [a, b], 0.0).heights([0, 0]);
         let there = Placed::new((rows, columns), [top, left], [a, b], outside).heights([top, left]);
         for ((name, here), (_, there)) in here.iter().zip(&there) {
-            // The box is solved by the same operations wherever it lies: the same bits.
+            // The box is solved by the same operations wherever it lies, which gives equal bits.
             let equal = |x: &f64, y: &f64| x.to_bits() == y.to_bits() || x.is_nan() && y.is_nan();
             let same = here.iter().zip(there).all(|(x, y)| equal(x, y));
             prop_assert!(same, "{}", name);
@@ -96,9 +95,8 @@ proptest! {
     }
 }
 
-/// Exchanging rows and columns, and slopes and pixel sizes with them, exchanges those of the
-/// heights: also in lines of every short length, for most of which the transform needs no space of
-/// its own.
+/// Exchanging rows and columns, with slopes and pixel sizes, exchanges those of the heights. This
+/// includes lines of every short length, for most of which the transform needs no working memory.
 #[test]
 fn a_turned_frame_has_turned_heights() {
     let short = (1..20).map(|columns| (13, columns));
@@ -117,7 +115,7 @@ fn a_turned_frame_has_turned_heights() {
             let plain = heights(p.view(), q.view(), [1.0, 1.5]);
             let turned = heights(q.t(), p.t(), [1.5, 1.0]);
             let differences = plain.iter().zip(turned.t()).map(|(a, b)| (a - b).abs());
-            // Heights of some tens; all are direct solutions, with the rounding of transforms of
+            // Heights of several tens. All solutions are direct, with the rounding of transforms of
             // 64 points.
             let largest = differences.fold(0.0, f64::max);
             assert!(largest < 1e-10, "{name}, {rows} × {columns}: {largest:e}");

@@ -1,4 +1,4 @@
-//! Images of 4096 × 4096: a small contact, and one that fills the frame.
+//! Images of 4096 × 4096 pixels: a small contact, and one that fills the frame.
 
 use crate::common::from_rim;
 use ndarray::{Array2, s};
@@ -6,14 +6,14 @@ use tactile_sfs::*;
 
 const N: usize = 4096;
 
-/// A paraboloid of the given radius in pixels around the centre of the frame, its mask and its
-/// image of 8 bits.
+/// A paraboloid with the given radius in pixels around the centre of the frame, its mask and its
+/// 8-bit image.
 fn paraboloid(radius: f32) -> (Array2<f32>, Array2<bool>, Array2<u8>) {
     let square = |(r, c): (usize, usize)| {
         let (x, y) = (c as f32 - 2047.5, r as f32 - 2047.5);
         (x * x + y * y) / (radius * radius)
     };
-    // Height 0.2 radius, slope −0.4 ρ at ρ radii from the centre.
+    // Height 0.2 radius, and slope −0.4 ρ at ρ radii from the centre.
     let z = Array2::from_shape_fn((N, N), |at| 0.2 * radius * (1.0 - square(at)));
     let mask = Array2::from_shape_fn((N, N), |at| square(at) < 1.0);
     let image = Array2::from_shape_fn((N, N), |at| {
@@ -37,8 +37,8 @@ fn contacts_in_images_of_4096() {
         let mut difference = (&surface.heights - &z).slice_move(inside);
         difference.mapv_inplace(f32::abs);
         let error = difference.mean().unwrap();
-        // Rounding to 8 bits hides slopes below 0.06 at the top and moves the others by up to 2 %:
-        // 1 % of the height.
+        // Rounding to 8 bits hides slopes below 0.06 at the top and changes the others by up to 2
+        // %: 1 % of the height.
         assert!(error < 0.01 * 0.2 * radius, "{radius}: {error}");
     }
 }

@@ -1,4 +1,4 @@
-//! The tests of `tactile-sfs`, in one program: the generic code is compiled once for all of them.
+//! The tests of `tactile-sfs`, in a single program, so that the generic code is compiled once.
 
 mod behaviour;
 mod common;

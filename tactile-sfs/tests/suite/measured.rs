@@ -1,5 +1,5 @@
-//! Against measured data and the surfaces of the shape-from-shading survey; skipped where the data
-//! are not there.
+//! Comparison with measured data and with the surfaces of the shape-from-shading survey. Skipped if
+//! the data are absent.
 #![allow(clippy::print_stdout)]
 
 use crate::common::{Alignment, errors, from_rim, height_error};
@@ -7,7 +7,7 @@ use ndarray::Array2;
 use tactile_sfs::*;
 use test_support::published as data;
 
-/// Channel means of an image: the grey the makers' table was calibrated with.
+/// Channel means of an image: the grey values of the published table's calibration.
 fn channel_mean(name: &str) -> Option<Array2<f64>> {
     let image = image::open(data(name)?).unwrap().into_rgb8();
     let shape = (image.height() as usize, image.width() as usize);
@@ -71,7 +71,8 @@ fn light_from_the_right_is_bright_on_the_right() {
         return;
     };
     let image = image::open(path).unwrap().into_luma8();
-    // Half-way along the vase both flanks are in the frame; the light's direction is (1, 0, 1).
+    // Half way along the vase both flanks are in the frame. The direction of the light is (1, 0,
+    // 1).
     let row: Vec<u8> = (0..128).map(|c| image.get_pixel(c, 64).0[0]).collect();
     let light = Lighting::new([1.0, 0.0, 1.0])
         .unwrap()
@@ -80,16 +81,16 @@ fn light_from_the_right_is_bright_on_the_right() {
     assert!(row[88] > row[40] && light.shade(-0.5, 0.0) > light.shade(0.5, 0.0));
 }
 
-/// Size of a pixel of 9DTact's rectified images, in metres.
+/// Pixel size of the rectified images of 9DTact, in metres.
 const PIXEL: f64 = 0.051_015_1e-3;
 /// Centre in pixels and radius in metres of the contact circle, and the radius of the ball.
 const CENTRE: [f64; 2] = [243.9, 188.5];
 const CONTACT: f64 = 67.6 * PIXEL;
 const BALL: f64 = 4e-3;
 
-/// A ball pressed into the gel of 9DTact, and the cap that it makes.
+/// A ball pressed into the gel of 9DTact, and its cap.
 struct PressedBall {
-    /// Darkening against the reference.
+    /// Darkening relative to the reference.
     signal: Array2<f64>,
     inside: Array2<bool>,
     cap: Array2<f64>,
@@ -122,7 +123,7 @@ impl PressedBall {
     }
 }
 
-/// The table that 9DTact's makers measured.
+/// The published table of 9DTact.
 fn makers_table() -> Option<DepthTable<f64>> {
     let text = std::fs::read_to_string(data("9dtact/grey_to_depth_mm.csv")?).unwrap();
     let row = |line: &str| {
@@ -139,19 +140,19 @@ fn ball_of_9dtact_by_the_makers_table() {
     let (Some(ball), Some(makers)) = (PressedBall::read(), makers_table()) else {
         return;
     };
-    // The makers measured theirs on this image, on a circle whose radius and centre they rounded
-    // down to pixels.
+    // The published table was measured on this image, with a circle whose radius and centre were
+    // rounded down to pixels.
     let zeroed = makers
         .with_contact_threshold(3.0)
         .and_then(DepthTable::zeroed)
         .unwrap();
     let error = ball.error(&zeroed, &ball.inside);
-    // The makers' published figure. Noise alone is 0.030 mm.
+    // The published value. Noise alone is 0.030 mm.
     assert!(error < 0.0462e-3, "{error}");
 }
 
-/// Mean errors of Tsai–Shah's heights, after an offset and after scale and offset, under the
-/// survey's three lights.
+/// Mean errors of the heights of Tsai–Shah, after an offset and after scale and offset, under the
+/// three lights of the survey.
 fn tsai_shah_errors(
     name: &str,
     z: &Array2<f64>,
@@ -174,13 +175,13 @@ fn tsai_shah_errors(
             "tsai-shah, {name}, {light:?}: {a:.2} px, scaled by {:.2} {b:.2} px",
             affine.scale
         );
-        // A scale that turned the surface over would be no agreement.
+        // A negative scale, which inverts the surface, would be no agreement.
         assert!(affine.scale > 0.0 && a < offset.constant_guess);
         errors
     })
 }
 
-/// Heights and slopes of Mozart's bust at full size, and at half size by means of 2 × 2.
+/// Heights and slopes of Mozart's bust at full size, and at half size by means of 2 × 2 pixels.
 fn mozart(half: bool) -> Option<(Array2<f64>, [Array2<f64>; 2])> {
     let text = std::fs::read_to_string(data("sfs/mozart_256_depth.csv")?).unwrap();
     let values: Vec<f64> = text
@@ -190,7 +191,7 @@ fn mozart(half: bool) -> Option<(Array2<f64>, [Array2<f64>; 2])> {
     let mut z = Array2::from_shape_vec((256, 256), values).unwrap();
     if half {
         let block = |r: usize, c: usize| z.slice(ndarray::s![2 * r..2 * r + 2, 2 * c..2 * c + 2]);
-        // Half as many pixels a unit: heights in pixels are halved as well.
+        // Half as many pixels per unit: heights in pixels are halved as well.
         z = Array2::from_shape_fn((128, 128), |(r, c)| block(r, c).sum() / 8.0);
     }
     let (p, q) = slopes(z.view(), [1.0, 1.0]);
@@ -201,8 +202,8 @@ fn mozart(half: bool) -> Option<(Array2<f64>, [Array2<f64>; 2])> {
 fn tsai_shah_is_no_worse_than_the_plain_method() {
     let (z, slopes, mask) = vase();
     let errors = tsai_shah_errors("vase", &z, &slopes, &mask);
-    // The plain method has, over several lights and settings, 5.3 to 7.3 px with scale and offset
-    // fitted, and 7.4 px or more (a constant: 7.4) with the offset alone.
+    // The unmodified method has errors of 5.3 to 7.3 px with scale and offset fitted, for several
+    // lights and settings, and of 7.4 px or more with the offset alone (7.4 for a constant).
     assert!(
         errors
             .iter()
@@ -213,15 +214,16 @@ fn tsai_shah_is_no_worse_than_the_plain_method() {
         return;
     };
     let errors = tsai_shah_errors("mozart", &z, &slopes, &z.mapv(|z| z > 0.0));
-    // The plain method's best of several lights and settings is 10.8 px; a constant has 11.65.
+    // The best result of the unmodified method for several lights and settings is 10.8 px. A
+    // constant has 11.65.
     assert!(
         errors.iter().flatten().all(|&error| error < 10.8),
         "{errors:?}"
     );
 }
 
-/// Height 0 outside the object, and the height where the surface faces the light: where
-/// z + (s_x x + s_y y)/s_z has a maximum, a minimum or a saddle.
+/// Height 0 outside the object, and the height at points that face the light, at which z + (s_x x +
+/// s_y y)/s_z has a maximum, a minimum or a saddle.
 fn singular_heights(z: &Array2<f64>, mask: &Array2<bool>, light: [f64; 3]) -> Array2<f64> {
     const RING: [[usize; 2]; 8] = [
         [0, 0],
@@ -254,7 +256,7 @@ fn singular_heights(z: &Array2<f64>, mask: &Array2<bool>, light: [f64; 3]) -> Ar
     })
 }
 
-/// Prints the errors that the README states of the methods for oblique light.
+/// Prints the errors in the README of the methods for oblique light.
 #[test]
 fn surfaces_from_the_heights_of_their_singular_points() {
     let (z, slopes, mask) = vase();
@@ -275,7 +277,7 @@ fn surfaces_from_the_heights_of_their_singular_points() {
             let informed = masked.with_known_heights(known.view());
             let eikonal = error(&Eikonal::new(lighting), &informed, Alignment::None);
             println!("{name}, {light:?}: eikonal {eikonal:.2} px");
-            // Under frontal light: a constant has 7.4 px on the vase and more on the bust.
+            // Under frontal light. A constant has 7.4 px on the vase and more on the bust.
             assert!(light[0] > 0.0 || eikonal < 1.15, "{name}: {eikonal}");
         }
     }

@@ -10,7 +10,7 @@ use tactile_sfs::*;
 
 const SIZES: [usize; 3] = [64, 128, 256];
 
-/// Orders of errors between successive halvings of the pixel.
+/// Orders of errors between successive halvings of the pixel size.
 fn orders(errors: &[f64]) -> Vec<f64> {
     errors
         .windows(2)
@@ -46,7 +46,8 @@ fn eikonal_error_falls_faster_than_linearly_from_a_known_peak() {
     for (name, shape) in SHAPES {
         let errors = SIZES.map(|n| falling(n, shape));
         println!("{name}: {errors:.5?}, orders {:.2?}", orders(&errors));
-        // Second order but for the peak, which the nearest pixel misses by up to half a pixel.
+        // Second order except at the peak, whose distance from the nearest pixel is up to half a
+        // pixel.
         assert!(
             orders(&errors).iter().all(|&order| order > 1.3),
             "{name}: {errors:?}"
@@ -57,9 +58,9 @@ fn eikonal_error_falls_faster_than_linearly_from_a_known_peak() {
 #[test]
 fn eikonal_from_a_rim_is_right_to_a_fraction_of_a_pixel() {
     let method = from_rim(Lighting::default()).with_branch(EikonalBranch::Convex);
-    // A vertical rim is found to a small part of a pixel; where the surface meets the plane at an
-    // angle (slope 1 here) its place within the pixel is not in the image, and up to half a pixel
-    // of height is lost.
+    // A vertical rim is determined to a small fraction of a pixel. If the surface meets the plane
+    // at an angle (slope 1 here), the image does not contain its position within the pixel, and up
+    // to half a pixel of height is lost.
     for ((name, shape), bound) in SHAPES.into_iter().zip([0.1, 0.2, 0.5]) {
         let errors = SIZES.map(|n| {
             let sampled = Sampled::new(n, shape);
@@ -77,7 +78,7 @@ fn eikonal_from_a_rim_is_right_to_a_fraction_of_a_pixel() {
 fn integrators_are_of_fourth_order() {
     for shape in [gaussian as Shape, waves] {
         for (name, method) in integrators() {
-            // Periodic, and these surfaces are not.
+            // The method is periodic, but these surfaces are not.
             if name == "frankot-chellappa" {
                 continue;
             }
@@ -88,7 +89,7 @@ fn integrators_are_of_fourth_order() {
                 errors(&surface.unwrap(), &case.z, Alignment::Offset).rms
             });
             println!("{errors:.5?}, orders {:.2?}", orders(&errors));
-            // 4 up to terms of higher order; the rises at the border are of third order, but few.
+            // 4 up to terms of higher order. The rises at the border are of third order, but few.
             assert!(
                 orders(&errors).iter().all(|&order| order > 3.4),
                 "{name}: {errors:?}"
@@ -99,7 +100,7 @@ fn integrators_are_of_fourth_order() {
 
 #[test]
 fn pixels_need_not_be_square() {
-    // The hemisphere seen through pixels 1.5 times as high as wide.
+    // The hemisphere with pixels that are 1.5 times as high as wide.
     let (wide, high) = (0.02, 0.03);
     let field = |shape: Shape, k: usize| {
         Array2::from_shape_fn((67, 101), |(r, c)| {
@@ -113,7 +114,8 @@ fn pixels_need_not_be_square() {
         .reconstruct(Image::new(image.view(), domain.with_mask(mask.view())))
         .unwrap();
     let error = errors(&surface, &z, Alignment::None);
-    // A hundredth of the radius, half a pixel: square pixels of this size reach the same.
+    // A hundredth of the radius, which is half a pixel: square pixels of this size have the same
+    // error.
     assert!(error.mean_absolute < 0.012, "{error:?}");
     let [z, p, q] = [0, 1, 2].map(|k| field(gaussian, k));
     for method in [
@@ -122,8 +124,8 @@ fn pixels_need_not_be_square() {
     ] {
         let surface = method.integrate(p.view(), q.view(), &domain).unwrap();
         let error = errors(&surface, &z, Alignment::Offset);
-        // Of fourth order, h⁴ = 10⁻⁶ times derivatives of some hundred; rises by the mean of two
-        // slopes miss this.
+        // Fourth order: h⁴ = 10⁻⁶ times derivatives of several hundred. Rises from the mean of two
+        // slopes would exceed this bound.
         assert!(error.max < 2e-4, "{error:?}");
     }
 }
@@ -146,7 +148,7 @@ fn least_squares_on_a_rectangle_is_poissons_equation() {
         parts.map(|part| part.pixels).collect::<Vec<_>>()
     });
     assert_eq!(parts[0], parts[1]);
-    // Rounding of heights near 1, times the condition of a grid of 48 × 48, some thousand.
+    // Rounding of heights near 1, times the condition of a grid of 48 × 48, several thousand.
     let error = errors(&transformed, &sparse.heights, Alignment::None);
     assert!(error.max < 1e-11, "{error:?}");
 }

@@ -1,8 +1,8 @@
-//! Answers of every method, compared with recorded ones: a change that is not meant to move a
-//! number must not.
+//! Recorded results of every method: a change that is not meant to change a number must reproduce
+//! them.
 //!
-//! `RECORD_ANSWERS=1 cargo test -p tactile-sfs --test suite recorded` writes the record anew; the
-//! commit says why numbers moved.
+//! `RECORD_ANSWERS=1 cargo test -p tactile-sfs --test suite recorded` rewrites the record. Give the
+//! reason in the commit.
 
 use ndarray::Array2;
 use tactile_sfs::{
@@ -17,13 +17,13 @@ use super::common::{
     waves,
 };
 
-/// Relative to the largest number of a line: the last bits of square roots and sums in another
-/// order, times the few hundred steps that some methods take.
+/// Relative to the largest number of a line: the last bits of square roots and of sums in another
+/// order, times several hundred steps of some methods.
 const TOLERANCE: f64 = 1e-12;
 
 const SIDE: usize = 48;
 
-/// Some of the solved heights, and the counts of the report.
+/// Some of the computed heights, and the counts of the report.
 fn add_surface(answers: &mut Answers, name: &str, surface: &Surface<f64>) {
     let solved = surface.heights.iter().filter(|z| z.is_finite());
     answers.add(name, solved.copied().step_by(47));
@@ -113,7 +113,7 @@ fn integrators(answers: &mut Answers) {
 
 fn samplers(answers: &mut Answers) {
     let scene = Sampled::new(SIDE, ellipsoid);
-    // Few points lie between the pixels, many on them.
+    // Few points lie between the pixels, many lie on pixels.
     for count in [9, 60, 500] {
         let points = EquallySpaced.sample(scene.z.view(), &scene.domain(), count);
         let points = points.expect("points");

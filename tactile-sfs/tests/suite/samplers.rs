@@ -1,4 +1,5 @@
-//! What every sampler must do: the count asked for, inside the mask, evenly, without allocating.
+//! Requirements for every sampler: the requested number of points, inside the mask, evenly
+//! distributed, without allocation.
 
 use crate::common::{Sampled, gaussian, sphere};
 use ndarray::Array2;
@@ -29,7 +30,7 @@ fn samplers_with_a_workspace_do_not_allocate() {
             0,
             "{count}"
         );
-        // 40 points move freely, 900 are nearly as dense as the pixels.
+        // 40 points move freely, and 900 are nearly as dense as the pixels.
         assert_eq!(points, sampler.sample(z, &domain, count).unwrap());
         assert!(
             sampler
@@ -87,7 +88,7 @@ fn samplers_give_the_count_inside_the_mask() {
     }
 }
 
-/// Whether a point's height is one of those of the pixels around it, or between them.
+/// Whether the height of a point is between those of the surrounding pixels.
 fn lies_between(z: &Array2<f64>, pixel: f64, point: &nalgebra::Point3<f64>) -> bool {
     let near = |at: f64| {
         [
@@ -119,14 +120,14 @@ fn the_same_surface_larger_gives_the_same_points_of_it() {
             .unwrap()
     };
     let (small, large) = (sample(90), sample(108));
-    // Middles of pixels: the frame's corner, half a pixel away, is what scales.
+    // Centres of pixels: the scaling is relative to the corner of the frame, half a pixel away.
     let scaled = |p: &nalgebra::Point3<f64>| (p.coords.xy().add_scalar(0.5) * 1.2).add_scalar(-0.5);
     let apart = small
         .iter()
         .zip(&large)
         .map(|(a, b)| (scaled(a) - b.coords.xy()).norm());
     let mean = apart.sum::<f64>() / 120.0;
-    // Points stand 8 pixels apart; what is left is the error of areas from central differences,
+    // Points are 8 pixels apart. The remaining error is that of areas from central differences, of
     // second order in the pixel.
     assert!(mean < 0.01, "{mean}");
 }
@@ -150,12 +151,12 @@ fn equal_spacing_is_even_on_the_surface() {
         .collect();
     let mean = nearest.iter().sum::<f64>() / 200.0;
     let spread = (nearest.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / 200.0).sqrt() / mean;
-    // A random draw has a spread of 0.52, a hexagonal lattice of 0.
+    // A random draw has a spread of 0.52, and a hexagonal lattice of 0.
     assert!(spread < 0.2, "{spread}");
 }
 
-/// Points of a ball stand for equal areas, of which ground steeper than 63° counts as if it were no
-/// steeper: the share of them within a radius is an integral, whatever the pixels' shape.
+/// Points of a ball represent equal areas, with slopes limited to 63°: their fraction within a
+/// radius is an integral, whatever the shape of the pixels.
 #[test]
 fn points_of_a_contact_stand_for_equal_areas_on_oblong_pixels_too() {
     const RADIUS: f64 = 40.0;
@@ -184,8 +185,7 @@ fn points_of_a_contact_stand_for_equal_areas_on_oblong_pixels_too() {
             let inside = points.iter().filter(|p| distance(p.x, p.y) < within);
             let found = inside.count() as f64 / COUNT as f64;
             let expected = area(within) / area(RADIUS);
-            // A circle cuts some forty cells of the points, of which one may count too many or too
-            // few in ten.
+            // A circle cuts about forty cells of the points, and may add or lose one of ten.
             assert!(
                 (found - expected).abs() < 0.015,
                 "{pixel:?}, {within}: {found} {expected}"
@@ -194,9 +194,9 @@ fn points_of_a_contact_stand_for_equal_areas_on_oblong_pixels_too() {
     }
 }
 
-/// The slope of a round body has no end at its rim: points follow the body, not the pixels there.
-/// Root mean square distance of a hemisphere's control points from its axis, over its radius in
-/// pixels.
+/// The slope of a round body is infinite at its rim: points must follow the body, not the pixels
+/// there. Root mean square distance of the control points of a hemisphere from its axis, divided by
+/// its radius in pixels.
 fn spread(radius: f64, centre: [f64; 2], count: usize) -> f64 {
     let square =
         |r: usize, c: usize| (r as f64 - centre[0]).powi(2) + (c as f64 - centre[1]).powi(2);
@@ -219,9 +219,10 @@ fn a_larger_hemisphere_has_the_same_points() {
     for k in 0..12 {
         let shift = [0.13 * f64::from(k), 0.29 * f64::from(k)].map(f64::fract);
         let at = |radius: f64| spread(radius, shift.map(|s| radius.ceil() + 3.0 + s), 200);
-        // Radii of 35 and 42 pixels, as a ball's contact at 0.7 N and 1.2 N: a pixel of 4000 is
-        // 1.2e-4 of the radius, their ragged edge some ten times that. With all the area a rim's
-        // pixels show it is 3e-3 more, always to one side.
+        // Radii of 35 and 42 pixels, as for the contact of a ball at 0.7 N and 1.2 N. One pixel of
+        // 4000 is 1.2e-4 of the radius, and the effect of the ragged edge is about ten times that.
+        // With the unlimited area of the rim pixels it would be larger by 3e-3, always in one
+        // direction.
         let apart = at(42.0) / at(35.1) - 1.0;
         assert!(apart.abs() < 2.5e-3, "{apart}");
     }

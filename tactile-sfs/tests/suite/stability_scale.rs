@@ -1,4 +1,4 @@
-//! Heights in every unit and both precisions; saturated, black and constant images.
+//! Heights in every unit and in both precisions; saturated, black and constant images.
 #![allow(clippy::print_stdout)]
 
 use crate::common::{Alignment, Sampled, errors, gaussian, integrators, reconstructions, sphere};
@@ -6,8 +6,8 @@ use ndarray::Array2;
 use tactile_sfs::*;
 use test_support::Worst;
 
-/// The unit of length is a factor of the heights; its rounding and that of the sums over 48 × 48
-/// pixels, whose condition is the number of pixels across, are all that may differ.
+/// The unit of length is a factor of the heights. Only its rounding and that of the sums over 48 ×
+/// 48 pixels, whose condition is the number of pixels across, may cause differences.
 #[test]
 fn integrals_have_no_unit() {
     let mut table = Worst::new("slope integration");
@@ -37,8 +37,7 @@ fn integrals_have_no_unit() {
     table.finish();
 }
 
-/// Whatever the image, a surface or a typed error comes back, and no height inside the mask is NaN
-/// or infinite.
+/// Every image gives a surface or a typed error, and no height inside the mask is NaN or infinite.
 #[test]
 fn saturated_and_constant_images_have_surfaces() {
     let scene = Sampled::new(24, sphere);

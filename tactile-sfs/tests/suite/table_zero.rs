@@ -1,4 +1,4 @@
-//! The zero of a depth table, against surfaces whose depth is known.
+//! The zero of a depth table, for surfaces of known depth.
 
 use tactile_sfs::*;
 
@@ -16,7 +16,7 @@ fn a_zeroed_table_keeps_its_differences_and_starts_at_zero() {
     assert_eq!(zeroed.depth(0.0), (0.0, true));
     for signal in [4.0, 17.5, 59.0] {
         let moved = table.depth(signal).0 - zeroed.depth(signal).0;
-        // The parabola is exact: rounding alone.
+        // The parabola is exact: only rounding.
         assert!((moved - 0.06).abs() < 1e-12, "{signal}: {moved}");
     }
     let again = zeroed.clone().zeroed().unwrap();
@@ -46,7 +46,7 @@ fn a_table_that_cannot_tell_its_zero_is_refused() {
             }
         );
     }
-    // Light that fades exponentially, to a seventh over the table.
+    // Light that decays exponentially, to a seventh over the table.
     let fading: Vec<(f64, f64)> = (0..60)
         .map(|s| (f64::from(s), -(1.0 - f64::from(s) / 70.0).ln()))
         .collect();

@@ -1,4 +1,5 @@
-//! Refits and evaluation allocate nothing once their memory has grown, counted by the allocator.
+//! Refits and evaluations do not allocate once their memory has grown. Allocations are counted by
+//! the allocator.
 
 use crate::common::{Uniform, bend};
 use nalgebra::{Matrix3, Point};

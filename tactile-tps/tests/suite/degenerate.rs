@@ -1,4 +1,5 @@
-//! What points do not determine keeps the identity, and what they barely determine is kept.
+//! The identity is kept in directions that the points do not determine, and barely determined
+//! directions are fitted.
 
 use crate::common::Uniform;
 use nalgebra::{Matrix3, Point, Point2, Point3, Rotation3, SVector, Vector3};
@@ -32,8 +33,8 @@ fn warps<const D: usize>(sources: &[Point<f64, D>], targets: &[Point<f64, D>]) -
     all
 }
 
-/// A shift of points of `rank` 1 to D moves the whole of space by it: rounding, times the
-/// condition number of a dozen points.
+/// A shift of points of `rank` 1 to D shifts the whole space: rounding, times the condition number
+/// of a dozen points.
 fn shifted<const D: usize>(rank: usize, size: f64, offset: f64) {
     let mut random = Uniform(rank as u64);
     let directions: [SVector<f64, D>; D] = core::array::from_fn(|_| random.point::<D>().coords);
@@ -63,7 +64,7 @@ fn shifted<const D: usize>(rank: usize, size: f64, offset: f64) {
 fn a_shift_of_few_directions_shifts_all_of_space() {
     for size in [1e-160, 1e-9, 1.0, 1e9, 1e160] {
         for offset in [0.0, 100.0] {
-            // One point has no size to scale others by: their squares must not overflow.
+            // A single point has no size for scaling: squares must not overflow.
             let least = if size > 1e100 { 2 } else { 1 };
             (least..=3).for_each(|rank| shifted::<2>(rank, size, offset));
             (least..=4).for_each(|rank| shifted::<3>(rank, size, offset));
@@ -71,7 +72,7 @@ fn a_shift_of_few_directions_shifts_all_of_space() {
     }
 }
 
-/// Landmarks on a diagonal that stretch along it: lengths across it stay.
+/// Landmarks on a diagonal that stretch along it: transverse lengths are kept.
 #[test]
 fn displacements_are_interpolated_along_a_line_and_kept_across() {
     let line = [[0.0, 0.0], [1.0, 1.0], [2.0, 2.0], [4.0, 4.0]].map(Point2::from);
@@ -79,13 +80,13 @@ fn displacements_are_interpolated_along_a_line_and_kept_across() {
     let mut all = spline(R2LogR, &line, &doubled);
     all.push(Box::new(Affine::fit(&line, &doubled, None).unwrap()));
     for warp in all {
-        // (0, 1) is (0.5, 0.5) on the line and (−0.5, 0.5) across.
+        // (0, 1) is (0.5, 0.5) along the line and (−0.5, 0.5) across it.
         let image = warp.apply(&Point2::new(0.0, 1.0));
         assert!((image - Point2::new(0.5, 1.5)).norm() < 1e-13, "{image}");
     }
 }
 
-/// Extents that differ by up to 3e-7 are no noise in double precision.
+/// In double precision, differences of extent up to 3e-7 are not noise.
 #[test]
 fn a_thin_direction_is_fitted() {
     let mut random = Uniform(3);
@@ -99,13 +100,13 @@ fn a_thin_direction_is_fitted() {
                 .for_each(|p| *p = Point3::new(p.x, p.y, thin * p.z) * scale);
             let targets: Vec<_> = sources.iter().map(|p| linear * p).collect();
             let found = Affine::fit(&sources, &targets, None).unwrap();
-            // Rounding of targets of size one over the thin extent.
+            // Rounding of targets of size one divided by the thin extent.
             assert!(
                 (found.linear - linear).norm() < 1e-14 / thin,
                 "{thin:e}, {scale:e}"
             );
             assert_eq!(found.rank(), 4);
-            // A needle: the rotation about it rests on the thin directions.
+            // A needle: the rotation about it depends on the thin directions.
             let needle = sources.iter().map(|p| Point3::new(p.x, thin * p.y, p.z));
             let needle: Vec<_> = needle.collect();
             let turned: Vec<_> = needle.iter().map(|p| turn * p).collect();
@@ -118,7 +119,7 @@ fn a_thin_direction_is_fitted() {
     }
 }
 
-/// A line turns by the least rotation, also when it is reversed.
+/// A line rotates by the smallest rotation, even if it is reversed.
 #[test]
 fn a_line_turns_without_twist() {
     let at = |direction: Vector3<f64>| [-1.0, 0.5, 2.0].map(|t| Point3::from(direction * t));
@@ -133,7 +134,8 @@ fn a_line_turns_without_twist() {
         let found = Affine::fit_rigid(&at(from), &at(to), None).unwrap().linear;
         assert!((found.determinant() - 1.0).abs() < 1e-14 && (found * from - to).norm() < 1e-14);
         let angle = from.dot(&to).acos();
-        // tr R = 1 + 2 cos of its angle, which no rotation from one line to the other makes less.
+        // tr R = 1 + 2 cos of its angle, and no rotation from one line to the other has a smaller
+        // angle.
         assert!((found.trace() - 1.0 - 2.0 * angle.cos()).abs() < 1e-14);
     }
 }

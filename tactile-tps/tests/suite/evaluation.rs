@@ -1,4 +1,4 @@
-//! Values and derivatives: right, the same bits alone, in batches and in threads, near and far.
+//! Values and derivatives: correct, bit-identical alone, in batches and in threads, near and far.
 
 use crate::common::{Uniform, bend, fit, for_all};
 use nalgebra::{Point, Point2, SMatrix, SVector};
@@ -10,7 +10,7 @@ fn has_the_derivatives_it_says<const D: usize, K: Kernel>(kernel: K, seed: u64) 
     let sources = random.points::<D>(20);
     let targets: Vec<_> = sources.iter().map(bend).collect();
     let spline = fit(&sources, &targets, &FitOptions::new(kernel));
-    // Off the centres, so that −r is smooth within the step.
+    // Away from the centres, so that −r is smooth within the step.
     let query = (0..)
         .map(|_| random.point::<D>())
         .find(|q| sources.iter().all(|x| (x - q).norm() > 0.05));
@@ -24,8 +24,8 @@ fn has_the_derivatives_it_says<const D: usize, K: Kernel>(kernel: K, seed: u64) 
         let bend =
             (spline.jacobian(&(query + step)) - spline.jacobian(&(query - step))) / (2.0 * STEP);
         for m in 0..D {
-            // Central differences: h² times third derivatives, at most w/0.05² with weights below
-            // 10.
+            // Central differences: h² times third derivatives, which are at most w/0.05² with
+            // weights below 10.
             assert!((slope[m] - jacobian[(m, k)]).abs() < 1e-4);
             for l in 0..D {
                 assert!((bend[(m, l)] - hessian[m][(l, k)]).abs() < 1e-2);
@@ -34,7 +34,7 @@ fn has_the_derivatives_it_says<const D: usize, K: Kernel>(kernel: K, seed: u64) 
     }
 }
 
-/// The bits of a point's value do not depend on the company it comes in.
+/// The bits of the value of a point do not depend on the other points of the batch.
 fn gives_the_same_bits_in_batches<const D: usize, K: Kernel>(kernel: K, seed: u64) {
     let mut random = Uniform(seed);
     let sources = random.points::<D>(33);
@@ -72,8 +72,8 @@ proptest! {
     }
 }
 
-/// Far from the points the terms cancel: the digits that are reported bound the distance from the
-/// law of the far field.
+/// Far from the points the terms cancel. The reported digits bound the distance from the asymptotic
+/// law.
 #[test]
 fn far_values_report_their_digits() {
     let sources = Uniform(21).points::<2>(40);
@@ -81,13 +81,13 @@ fn far_values_report_their_digits() {
     let spline = fit(&sources, &targets, &FitOptions::new(R3));
     let place = |distance: f64| Point2::new(distance, 0.5 * distance);
     assert!(spline.digits(&place(1e7)) < 2.0 && spline.digits(&sources[0]) > 8.0);
-    // Moments of degree 0 and 1 vanish: of fixed direction the value grows as the distance, with a
-    // correction of 1/r.
+    // Moments of degree 0 and 1 vanish: in a fixed direction the value is proportional to the
+    // distance, with a correction of 1/r.
     let slope = |distance: f64| spline.apply(&place(distance)).coords / distance;
     let far = slope(1e3);
     for distance in [3e3, 1e4] {
         let lost = 10_f64.powf(-spline.digits(&place(distance)));
-        // 3/r: the spread of sources of size one.
+        // 3/r: the extent of sources of size one.
         assert!((slope(distance) - far).norm() < (lost + 3e-3) * far.norm());
     }
 }

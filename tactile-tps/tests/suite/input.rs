@@ -1,11 +1,11 @@
-//! Points as they come: coinciding, flat, broken.
+//! Irregular input: coinciding, flat and invalid points.
 
 use crate::common::{Uniform, bend, fit, options};
 use nalgebra::{Point2, Point3, SVector};
 use tactile_tps::{FitOptions, NegR, R2LogR, Smoothing, ThinPlateSpline, TpsError};
 
-/// Twice the same place with one value is one point; with two values it is their weighted mean,
-/// smoothed.
+/// Two sources at one position with the same value are one point. With two values they are their
+/// weighted mean, smoothed.
 #[test]
 fn coinciding_points_are_merged() {
     let mut random = Uniform(11);
@@ -42,7 +42,7 @@ fn coinciding_points_are_merged() {
     assert!((smoothed.apply(&query) - single.apply(&query)).norm() < 1e-12);
 }
 
-/// A flat set in space warps along itself; a tolerance decides what counts as flat.
+/// A flat set in space is warped only along itself. A tolerance decides what is flat.
 #[test]
 fn directions_that_are_not_spanned_are_dropped() {
     let mut random = Uniform(5);
@@ -58,7 +58,7 @@ fn directions_that_are_not_spanned_are_dropped() {
     let spline = fit(&exact, &targets, &FitOptions::new(NegR));
     assert_eq!(spline.report.rank, 3);
     let normal = SVector::<f64, 3>::new(0.5, -0.25, -1.0).normalize();
-    // Across it the identity stands.
+    // The identity is kept across it.
     assert!((spline.jacobian(&exact[0]) * normal - normal).norm() < 1e-10);
     let thin = flat(1e-4, &mut random);
     assert_eq!(fit(&thin, &targets, &FitOptions::new(NegR)).report.rank, 4);

@@ -1,4 +1,5 @@
-//! The iterative solver against the direct one, and what it tells and bears on the way.
+//! The iterative solver compared with the direct one, its progress reports and its difficult
+//! inputs.
 
 use core::ops::ControlFlow;
 
@@ -11,7 +12,8 @@ use tactile_tps::{
 
 const POINTS: usize = 900;
 
-/// Largest difference of values between the iterative and the direct spline, and the steps taken.
+/// Largest difference between the values of the iterative and the direct spline, and the number of
+/// steps.
 fn compare<const D: usize, K: Kernel>(
     sources: &[Point<f64, D>],
     options: &FitOptions<K>,
@@ -40,9 +42,9 @@ fn compare<const D: usize, K: Kernel>(
     )
 }
 
-/// The residual is at most 1e-10 of targets of size one; between the points a spline is off by
-/// little more than at them.
-/// Steps grow slowly with the number of points; a preconditioner without effect takes hundreds.
+/// The residual is at most 1e-10 of targets of size one, and errors between the points are not much
+/// larger. The number of steps grows slowly with the number of points. An ineffective
+/// preconditioner needs hundreds.
 #[test]
 fn iteration_finds_the_direct_solution() {
     let (plane, space) = (
@@ -69,7 +71,7 @@ fn iteration_finds_the_direct_solution() {
     }
 }
 
-/// Points in a plane of space, on a lattice with all its ties, in dense clumps.
+/// Points in a plane of space, on a lattice with equal distances, and in dense clusters.
 #[test]
 fn awkward_points_are_no_obstacle() {
     let flat: Vec<_> = Uniform(9)
@@ -98,8 +100,8 @@ fn awkward_points_are_no_obstacle() {
     }
 }
 
-/// New targets, weights and λ are those of a fit with them, and cost no memory after the first
-/// round.
+/// Results for new targets, weights and λ are those of a new fit, and need no memory after the
+/// first.
 #[test]
 fn refits_are_fits() {
     let sources = Uniform(11).points::<3>(POINTS);
@@ -137,7 +139,7 @@ fn refits_are_fits() {
     assert_eq!(again.count_total, 0);
 }
 
-/// The watch hears of both stages, and can stop either.
+/// The callback is called in both stages and can stop either.
 #[test]
 fn a_watch_stops_the_fit() {
     let sources = Uniform(12).points::<2>(POINTS);
@@ -161,8 +163,8 @@ fn a_watch_stops_the_fit() {
     });
     let early = early.expect("the best so far");
     assert!(early.report.iterations == 3 && !early.report.converged());
-    // What was told is what is reported: the residual carried along and the one formed anew differ
-    // by rounding.
+    // The last progress report agrees with the final report: the updated and the recomputed
+    // residual differ by rounding.
     let (told, reported) = (residuals[3], early.report.residual.expect("measured"));
     assert!(
         (told / reported - 1.0).abs() < 1e-6 && reported < 0.01 * residuals[0],

@@ -1,4 +1,5 @@
-//! Local fields: gradients within their errors, wrong pairs found, answers at any point.
+//! Local fields: gradients are within their errors, wrong pairs are found, and there are results at
+//! any point.
 
 use crate::common::Uniform;
 use nalgebra::{Point, SMatrix, SVector};
@@ -9,7 +10,7 @@ fn share(random: &mut Uniform) -> f64 {
     0.5 * (random.next() + 1.0)
 }
 
-/// Of variance 1.
+/// A number of variance 1.
 fn normal(random: &mut Uniform) -> f64 {
     0.5 * (0..12).map(|_| random.next()).sum::<f64>()
 }
@@ -26,7 +27,8 @@ fn dimple<const D: usize>(width: f64, p: &Point<f64, D>) -> (SVector<f64, D>, SM
     (u, gradient)
 }
 
-/// Scattered points, displaced with noise: a share of them anywhere within two spacings.
+/// Scattered points, displaced with noise: a fraction of them has a random displacement of up to
+/// two spacings.
 fn check<const D: usize>(count: usize, width: f64, noise: f64, wrong: f64) {
     let mut random = Uniform(count as u64 + 5);
     let spacing = (count as f64).powf(-1.0 / D as f64);
@@ -57,8 +59,8 @@ fn check<const D: usize>(count: usize, width: f64, noise: f64, wrong: f64) {
     }
     let share = within as f64 / (count * D * D) as f64;
     let scene = format!("{D}-D, width {width}, noise {noise}, wrong {wrong}");
-    // Neighbours share their errors: the share of some thirty patches varies by 2 %, and two of
-    // these below the 94 % of many fields are allowed.
+    // Neighbours have correlated errors: the fraction of about thirty patches varies by 2 %. Two
+    // standard deviations below the 94 % of many fields are allowed.
     assert!((0.90..=0.99).contains(&share), "{scene}: {share} within");
     if wrong == 0.0 {
         assert!(
@@ -90,7 +92,7 @@ fn gradients_lie_within_their_errors_and_wrong_pairs_are_left_out() {
     }
 }
 
-/// A homogeneous field is exact, inside and outside, whatever its unit.
+/// A homogeneous field is exact, inside and outside, in every unit.
 #[test]
 fn an_affine_field_is_exact_at_any_point() {
     let mut random = Uniform(3);

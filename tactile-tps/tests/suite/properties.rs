@@ -1,5 +1,5 @@
-//! What every spline must be: interpolating, affine where its targets are, the same in any frame,
-//! unit and order.
+//! Requirements for every spline: it interpolates, it is affine if its targets are, and it does not
+//! depend on frame, unit or order.
 
 use crate::common::{Uniform, bend, fit, for_all, largest, options};
 use nalgebra::{Point, Point2, Point3, Rotation2, Rotation3, SMatrix, SVector};
@@ -14,7 +14,7 @@ fn interpolates<const D: usize, K: Kernel>(kernel: K, seed: u64) {
     let targets: Vec<_> = sources.iter().map(bend).collect();
     let spline = fit(&sources, &targets, &FitOptions::new(kernel));
     for (x, y) in sources.iter().zip(&targets) {
-        // Rounding of sums of 40 terms whose weights reach some 1e3 for r³ on close points: far
+        // Rounding of sums of 40 terms whose weights reach about 1e3 for r³ on close points: far
         // below 1e-10.
         assert!((spline.apply(x) - y).norm() < 1e-10);
     }
@@ -39,8 +39,8 @@ fn reproduces_affine_maps<const D: usize, K: Kernel>(kernel: K, seed: u64) {
             &targets,
             &options(kernel.clone(), smoothing, None),
         );
-        // The targets' own rounding, up to 1e-15 of their size 10 over 30 points, times the
-        // condition number: close points under r³ bring it to 1e8.
+        // The rounding of the targets, up to 1e-15 of their size 10 over 30 points, times the
+        // condition number, which reaches 1e8 for close points with r³.
         let rounding = 5e-15 * spline.report.condition;
         assert!(
             largest(
@@ -56,7 +56,7 @@ fn reproduces_affine_maps<const D: usize, K: Kernel>(kernel: K, seed: u64) {
     }
 }
 
-/// x ↦ s R x + b on the sources and the queries changes nothing but the units of λ.
+/// x ↦ s R x + b applied to sources and queries changes only the unit of λ.
 fn is_the_same_in_any_frame<const D: usize, K: Kernel>(
     kernel: K,
     seed: u64,
@@ -75,7 +75,7 @@ fn is_the_same_in_any_frame<const D: usize, K: Kernel>(
     let there = fit(&elsewhere, &targets, &options(0.01 * scale.powi(degree)));
     for _ in 0..20 {
         let query = random.point::<D>() * 1.5;
-        // Rounding of the moved coordinates, 1e-15, times a condition number below 1e4.
+        // Rounding of the transformed coordinates, 1e-15, times a condition number below 1e4.
         assert!((here.apply(&query) - there.apply(&moved(&query))).norm() < 1e-10);
     }
 }
@@ -106,12 +106,12 @@ fn smooths_towards_the_affine_fit<const D: usize, K: Kernel>(kernel: K, seed: u6
     let limit = Affine::fit(&sources, &targets, Some(&weights)).expect("an affine map");
     let spline = fit(&sources, &targets, &options(1e12));
     let query = random.point::<D>();
-    // What is left of the bending goes as 1/λ.
+    // The remaining bending is proportional to 1/λ.
     assert!((spline.apply(&query) - limit.apply(&query)).norm() < 1e-9);
 }
 
-/// The same spline by every way in: at once, refitted in place, by the spectrum, with weights and
-/// without.
+/// Every method gives the same spline: fitted directly, refitted in place, from the spectrum, with
+/// and without weights.
 fn refits_to_the_same<const D: usize, K: Kernel + Default>(kernel: K, seed: u64) {
     let mut random = Uniform(seed);
     let sources = random.points::<D>(35);
@@ -189,8 +189,8 @@ proptest! {
     }
 }
 
-/// Noise of a known size on a smooth map: cross-validation must come closer to the map than
-/// interpolation does.
+/// Noise of a known size on a smooth map: cross-validation must be closer to the map than
+/// interpolation.
 #[test]
 fn cross_validation_finds_the_noise() {
     let mut random = Uniform(7);

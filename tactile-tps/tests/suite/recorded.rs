@@ -1,8 +1,8 @@
-//! Answers of every public path, compared with recorded ones: a change that is not meant to move a
-//! number must not.
+//! Recorded results of every public method: a change that is not meant to change a number must
+//! reproduce them.
 //!
-//! `RECORD_ANSWERS=1 cargo test -p tactile-tps --test suite recorded` writes the record anew; the
-//! commit says why numbers moved.
+//! `RECORD_ANSWERS=1 cargo test -p tactile-tps --test suite recorded` rewrites the record. Give the
+//! reason in the commit.
 
 use nalgebra::{Point, Point1};
 use tactile_tps::{
@@ -13,11 +13,12 @@ use test_support::Answers;
 
 use super::common::{Uniform, bend, options};
 
-/// Relative to the largest number of a line: sums of 40 terms in another order differ by 1e-15,
-/// times condition numbers of at most 1e4: processors with wider instructions sum in another order.
+/// Relative to the largest number of a line. Processors with wider SIMD registers sum in another
+/// order: sums of 40 terms differ by 1e-15, times condition numbers of at most 1e4.
 const TOLERANCE: f64 = 1e-11;
 
-/// Where λ minimises a score: its least is flat, so that λ is known to the root of rounding, 1e-8.
+/// For a λ that minimises a score: the minimum is flat, so that λ is accurate to the square root of
+/// rounding, 1e-8.
 const SELECTED_TOLERANCE: f64 = 1e-7;
 
 fn spline<const D: usize, const M: usize, K: Kernel>(
@@ -115,8 +116,8 @@ fn all() -> Answers {
     answers
 }
 
-/// Iteration stops at a residual: its answers are those of the direct solver to that, and are not
-/// recorded.
+/// The iteration stops at a residual: its results agree with the direct solver within it, and are
+/// not recorded.
 #[test]
 fn answers_are_the_recorded_ones() {
     let found = all();

@@ -1,7 +1,7 @@
-//! Agreement with splines computed in 110-digit arithmetic, case by case, to the tolerance their
-//! authors state.
+//! Agreement with splines computed in 110-digit arithmetic, case by case, within the tolerance
+//! stated by the reference.
 //!
-//! The numbers lie outside the repository, in the folder named by `TACTILE_DATA`.
+//! The numbers are outside the repository, in the folder named by `TACTILE_DATA`.
 #![allow(clippy::print_stdout)]
 
 use crate::common::largest;
@@ -10,13 +10,13 @@ use serde_json::Value;
 use tactile_tps::{FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, TpsError};
 use test_support::{Worst, numbers};
 
-/// Functions of four outputs, short ones padded with zero: a map of space would keep the identity
-/// across degenerate points, and the reference does not.
+/// Functions with four outputs, padded with zeros: a map of space would keep the identity across
+/// degenerate points, whereas the reference does not.
 const OUTPUTS: usize = 4;
 
 type Fitted<const D: usize, K> = Result<Spline<D, OUTPUTS, K>, TpsError>;
 
-/// Enters an error over its tolerance.
+/// Enters an error relative to its tolerance.
 fn enter(table: &mut Worst, case: &Value, quantity: &str, error: f64, tolerance: f64) {
     let ratio = error / tolerance;
     if ratio.is_nan() || ratio > 1.0 {
@@ -34,7 +34,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().expect("a number")
 }
 
-/// Rows of numbers as points, short rows padded with zero.
+/// Rows of numbers as points, with short rows padded with zeros.
 fn points<const D: usize>(value: &Value) -> Vec<Point<f64, D>> {
     let point = |row: &Value| {
         let row = numbers(row);
@@ -51,7 +51,7 @@ fn options<K: Kernel>(case: &Value, kernel: K) -> FitOptions<K> {
     crate::common::options(kernel, smoothing, weights.as_deref())
 }
 
-/// The tolerance the reference states: never below 1e-13, growing with conditioning and
+/// The tolerance stated by the reference: at least 1e-13, and increasing with conditioning and
 /// cancellation.
 fn tolerance(n: usize, sensitivity: f64, summation: f64) -> f64 {
     f64::max(
@@ -80,8 +80,8 @@ fn check<const D: usize, K: Kernel>(table: &mut Worst, case: &Value, kernel: K) 
     coefficients(table, case, &spline, &targets);
 }
 
-/// Two points in one place: an error where their values differ, the spline of the others where they
-/// agree.
+/// Two points at one position: an error if their values differ, and the spline of the others if
+/// they agree.
 fn singular<const D: usize, K: Kernel>(
     case: &Value,
     sources: &[Point<f64, D>],
@@ -196,8 +196,8 @@ fn coefficients<const D: usize, K: Kernel>(
         .zip(&rows)
         .flat_map(|((_, w), row)| (0..row.len()).map(move |k| w[k] - row[k]));
     let (error, size) = (largest(errors), largest(rows.iter().flatten().copied()));
-    // Of points that nearly coincide the weights share a sum. Each alone keeps rounding times the
-    // condition number.
+    // For points that nearly coincide, only the sum of the weights is well determined. The error of
+    // each weight is rounding times the condition number.
     let condition = spline.report.condition;
     let coincidence = if condition > 1e10 {
         0.5f64.powi(53) * condition

@@ -1,6 +1,6 @@
 //! Scales from 1e-9 to 1e9, offsets of 1e6 diameters, nearly flat and nearly equal points, λ up to
-//! 1e12 and singular systems: every error in units of what rounding the inputs
-//! alone does to the exact spline.
+//! 1e12 and singular systems. Every error is measured in units of the effect that rounding of the
+//! inputs alone has on the exact spline.
 #![allow(clippy::print_stdout)]
 
 use crate::common::options;
@@ -16,8 +16,9 @@ fn points<const D: usize>(value: &Value) -> Vec<Point<f64, D>> {
         .collect()
 }
 
-/// `condition` counts every rounding of an input once. A fit does some n = 8 operations per entry
-/// of a system of 12 rows, and an algorithm that is backward stable is within that many units: 100.
+/// `condition` counts every rounding of an input once. A fit performs about n = 8 operations per
+/// entry of a system of 12 rows, and a backward stable algorithm is within this number of units:
+/// 100.
 const ALLOWED: f64 = 100.0;
 
 fn check<const D: usize, K: Kernel>(table: &mut Worst, case: &Value, kernel: K) {

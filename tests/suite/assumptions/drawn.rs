@@ -1,5 +1,5 @@
-//! Worlds drawn at random: everything that is stated is wrong by as much as its stated error
-//! allows, and the light or the camera departs from what is assumed in up to three respects.
+//! Randomly drawn worlds: every stated value is wrong by as much as its stated error allows, and
+//! the light or the camera departs from the assumptions in up to three respects.
 use super::worlds::{Check, Stated, World};
 use super::{Outcome, ball};
 use rand::{Rng, RngExt, SeedableRng, rngs::ChaCha8Rng, seq::IndexedRandom};
@@ -8,8 +8,8 @@ use tactile_imaging::pipeline::Flag;
 
 type Departure = (&'static str, fn(&mut World, f64));
 
-/// Departures of the light and the camera, by a number from -1 to 1. An object that reflects
-/// otherwise is not among them: the coupling's error states it.
+/// Departures of the light and the camera, as a function of a number from −1 to 1. An object with
+/// another reflectance is not among them, because the error of the coupling covers it.
 const DEPARTURES: [Departure; 10] = [
     ("lamps since the calibration", |w, x| {
         w.lamps = 1.0 + 0.1 * x
@@ -34,7 +34,7 @@ const DEPARTURES: [Departure; 10] = [
     ("coarse pixels", |w, _| w.camera = w.camera.coarser(2)),
 ];
 
-/// A world whose inputs have the errors that are assumed where none is stated.
+/// A world whose inputs have the errors that are assumed by default.
 fn honest(rng: &mut impl Rng, check: Option<Check>) -> (World, Stated) {
     let mut normal = || rng.sample::<f64, _>(StandardNormal);
     let mut world = World {
@@ -50,7 +50,7 @@ fn honest(rng: &mut impl Rng, check: Option<Check>) -> (World, Stated) {
         known_ball: [5e-3, 0.02].map(|error| 1.0 + error * normal()),
         ..Stated::default()
     };
-    // A guide under a skin where a known ball is pressed, a bare one otherwise.
+    // A guide under a skin for the press of a known ball, a bare guide otherwise.
     let reflectance = (0.12 * normal()).exp();
     if !matches!(check, Some(Check::KnownBall(_))) {
         world.reflectance = reflectance;
@@ -66,7 +66,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// Worlds with this check and so many departures.
+/// Worlds with this check and this number of departures.
 fn draw(check: Option<Check>, departures: usize, count: u64) -> Vec<Outcome> {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut outcomes = Vec::new();
@@ -77,7 +77,7 @@ fn draw(check: Option<Check>, departures: usize, count: u64) -> Vec<Outcome> {
             names.push(name);
             change(&mut world, rng.random_range(-1.0..1.0));
         }
-        // What is refused is not silent.
+        // A refusal is not a silent error.
         let outcome = Outcome::of(world.measure(&stated, 100 + seed)).ok();
         if let Some(outcome) = outcome.as_ref().filter(|outcome| outcome.is_silent()) {
             let percent = 100.0 * outcome.error;
@@ -88,7 +88,7 @@ fn draw(check: Option<Check>, departures: usize, count: u64) -> Vec<Outcome> {
     outcomes
 }
 
-/// `WORLDS=300` draws as many of each kind: minutes, for `.ci/run studies`.
+/// `WORLDS=300` draws 300 worlds of each kind in several minutes, for `.ci/run studies`.
 #[test]
 fn drawn_worlds_are_held_or_flagged() {
     let count = test_support::draws("WORLDS", 8);
@@ -119,15 +119,15 @@ fn drawn_worlds_are_held_or_flagged() {
             100.0 * share(|outcome| !outcome.flags.is_empty()),
             100.0 * silent,
         );
-        // Three standard deviations of so many draws.
+        // Three standard deviations for this number of draws.
         let slack = 3.0 * (0.05 * 0.95 / all).sqrt();
         assert!(silent < 0.05 + slack, "{check:?}, {departures}: {silent}");
         assert!(departures > 0 || held > 0.95 - slack, "{check:?}: {held}");
     }
 }
 
-/// Lamps or exposure change since the calibration, with a new reference or after it. `WORLDS=300`
-/// draws as many sessions.
+/// Lamps or exposure change after the calibration, before or after a new reference. `WORLDS=300`
+/// draws 300 sessions.
 #[test]
 fn forces_under_changed_lamps_are_held_or_flagged() {
     let count = test_support::draws("WORLDS", 14);

@@ -1,8 +1,9 @@
-//! What happens when the world is not as assumed: the error of the modulus, what was stated of it,
-//! and whether that was true.
+//! What happens if the assumptions are wrong: the error of the modulus, its stated error, and
+//! whether the stated error was correct.
 //!
-//! Contacts are by finite elements at finite strain. A row departs from what the default pipeline
-//! assumes in one respect or in all; its answer's interval holds the truth, or a flag about the
+//! Contacts are computed by finite elements at finite strain. A row departs from the assumptions of
+//! the default pipeline in one respect or in all. The interval of its result must contain the true
+//! value, or a flag about the modulus must name the cause, unless [`UNSEEN`] lists the row.
 //! modulus says what is wrong, or the row is one that [`UNSEEN`] names.
 #![allow(clippy::print_stdout)]
 mod drawn;
@@ -200,7 +201,7 @@ fn rows() -> Vec<Row> {
     ]
 }
 
-/// A little of everything that the light and the camera may do.
+/// A small departure in every respect of the light and the camera.
 fn all_of_it(world: &mut World) {
     world.exponent = 0.97;
     world.levels = [1.01, 0.99];
@@ -212,8 +213,8 @@ fn all_of_it(world: &mut World) {
     world.camera.read_noise_grey *= 2.0;
 }
 
-/// Flags of the surface, the match and the strain excuse nothing: the modulus of a ball does not
-/// use them, and one always stands on frames so coarse.
+/// Flags of the surface, the match and the strain are no excuse: the modulus of a ball does not use
+/// them, and frames as coarse as these always have one.
 fn concerns_modulus(flag: &Flag) -> bool {
     !matches!(
         flag,
@@ -224,17 +225,17 @@ fn concerns_modulus(flag: &Flag) -> bool {
     )
 }
 
-/// What a measurement says of the modulus.
+/// The modulus of a measurement.
 struct Outcome {
     error: f64,
-    /// Of the interval, relative to the truth.
+    /// Half width of the interval, relative to the true value.
     half_width: f64,
     held: bool,
     flags: Vec<String>,
 }
 
 impl Outcome {
-    /// Of a refusal its sentence.
+    /// The outcome of a measurement, or of a refusal its sentence.
     fn of(found: Result<Measurement, PipelineError>) -> Result<Self, PipelineError> {
         let found = found?;
         let modulus = found.youngs_modulus_pa?;
@@ -249,13 +250,13 @@ impl Outcome {
         })
     }
 
-    /// Wrong, and nothing says so.
+    /// Whether the result is wrong without a flag.
     fn is_silent(&self) -> bool {
         !self.held && self.flags.is_empty()
     }
 }
 
-/// Prints what was found of a row in so many draws of the noise.
+/// Prints the results of a row for several draws of the noise.
 fn print(assumed: &str, found: &[Result<Outcome, PipelineError>]) {
     let outcomes = || found.iter().flatten();
     let largest = |of: fn(&Outcome) -> f64| {
@@ -280,7 +281,7 @@ fn print(assumed: &str, found: &[Result<Outcome, PipelineError>]) {
     );
 }
 
-/// `SEEDS=5` takes more draws of the noise than one.
+/// `SEEDS=5` repeats the test with five draws of the noise.
 #[test]
 fn a_world_that_is_not_as_assumed_stays_within_the_interval_or_is_flagged() {
     let seeds = test_support::draws("SEEDS", 1);
@@ -290,7 +291,7 @@ fn a_world_that_is_not_as_assumed_stays_within_the_interval_or_is_flagged() {
         let found: Vec<_> = (0..seeds).map(measure).collect();
         print(row.assumed, &found);
         let outcomes = found.iter().flatten();
-        // Of five draws one may miss an interval of 95 %.
+        // One of five draws may lie outside an interval of 95 %.
         if outcomes.filter(|o| o.is_silent()).count() as u64 > seeds / 5 {
             silent.push(row.assumed);
         }

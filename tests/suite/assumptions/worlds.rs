@@ -1,4 +1,4 @@
-//! A sensor and a press as they are, and as the user states them.
+//! A sensor and a press: the true values, and the values stated by the user.
 use crate::finite_element_presses::recorded_balls;
 use ndarray::Array2;
 use tactile_imaging::elasticity::contact::{Layer, Waveguide};
@@ -16,7 +16,7 @@ use tactile_simulate::{
 pub(super) const RADIUS_M: f64 = 3e-3;
 pub(super) const MODULUS_PA: f64 = 103e3;
 
-/// What is pressed: always solved by finite elements at finite strain.
+/// The object: always solved by finite elements at finite strain.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) enum Sample {
     /// The paper's ball of 103 kPa on its guide, ν = ½.
@@ -24,7 +24,7 @@ pub(super) enum Sample {
     Ball,
     /// The same ball with this Poisson's ratio.
     Compressible(f64),
-    /// The same ball on a guide to which it sticks.
+    /// The same ball, sticking to its guide.
     Sticking,
     /// The flat face of a cylinder between plates, sliding or sticking.
     Face(Interface),
@@ -32,14 +32,15 @@ pub(super) enum Sample {
     Adhering(f64),
 }
 
-/// What becomes of the frames' light on the way to the file.
+/// How the light of the frames is distorted before it is stored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Distortion {
-    /// 255 (g/255)^(1/γ), of the reference too.
+    /// 255 (g/255)^(1/γ), also for the reference.
     Gamma(f64),
-    /// Light times 1 + s x/a, as of a press whose force is not along the axis.
+    /// Light times 1 + s x/a, as for a press whose force is not along the axis.
     Skew(f64),
-    /// This share of the light is spread evenly over a square with sides of the frame's height.
+    /// This fraction of the light is distributed evenly over a square whose side is the height of
+    /// the frame.
     Halo(f64),
 }
 
@@ -76,39 +77,40 @@ impl Distortion {
     }
 }
 
-/// How things are.
+/// The true values.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct World {
     pub(super) sample: Sample,
-    /// Light goes as this power of the pressure.
+    /// The light is proportional to this power of the pressure.
     pub(super) exponent: f64,
     pub(super) camera: Camera,
     /// Brightness of the lamps in the two frames.
     pub(super) levels: [f64; 2],
-    /// Largest difference between loading and unloading over the range, in the calibration.
+    /// Largest difference between loading and unloading in the calibration, relative to the range.
     pub(super) hysteresis: f64,
-    /// The gauge shows so many times the force.
+    /// Reading of the gauge relative to the force.
     pub(super) gauge: f64,
-    /// Light of the object over that of the calibrator at one pressure.
+    /// Light of the object relative to that of the calibration object at the same pressure.
     pub(super) reflectance: f64,
-    /// Brightness of the lamps over that during the calibration. The reference is taken anew.
+    /// Brightness of the lamps relative to that during the calibration. The reference is taken
+    /// anew.
     pub(super) lamps: f64,
     pub(super) loads_n: [f64; 2],
     pub(super) check: Option<Check>,
     pub(super) distortion: Option<Distortion>,
 }
 
-/// A press of known force beside the frames.
+/// A press of known force in addition to the frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Check {
     /// The sample.
     Sample,
-    /// A ball of 180 kPa and 3 mm, by a force (N) that it was solved for.
+    /// A ball of 180 kPa and 3 mm, with a force (N) for which it was solved.
     KnownBall(f64),
 }
 
 impl Check {
-    /// Its frame beside those of the trial, its force, and what it is stated to press.
+    /// Its frame in addition to those of the trial, its force, and the stated object.
     fn press(self, trial: &Trial, stated: &Stated) -> (Array2<u8>, f64, CheckedObject) {
         let mut options = trial.scene.options().clone();
         options.seed += 1 << 32;
@@ -126,7 +128,8 @@ impl Check {
                 KnownBall::modulus(stated.known_ball[1] * modulus_pa, None),
             ));
         }
-        // The last load of the trial again, as the camera's gain follows from all of them.
+        // The last load of the trial is simulated again, because the camera gain depends on all of
+        // them.
         let made = PressScene::new(options).unwrap().simulate();
         let force_n = made.truth.last().unwrap().contact.force_n;
         let frame = made.frames.into_iter().next_back().unwrap();
@@ -134,7 +137,7 @@ impl Check {
     }
 }
 
-/// What the user says of them: relative to the truth, with relative standard errors.
+/// The values stated by the user: relative to the true values, with relative standard errors.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stated {
     pub(super) object: Object,
@@ -147,9 +150,9 @@ pub(super) struct Stated {
     pub(super) length_error: Option<f64>,
     pub(super) radius_error: Option<f64>,
     pub(super) poisson_error: Option<f64>,
-    /// Whether the light of the calibration's reference was kept.
+    /// Whether the light of the calibration reference was kept.
     pub(super) keeps_light: bool,
-    /// The weight of a check, radius and modulus of a known ball.
+    /// The weight of a check; radius and modulus of a known ball.
     pub(super) weight: f64,
     pub(super) known_ball: [f64; 2],
 }
@@ -159,7 +162,7 @@ impl Default for World {
         Self {
             sample: Sample::Ball,
             exponent: 1.0,
-            // Four times as wide pixels as the paper's over the same 30 mm.
+            // Pixels four times as wide as the paper's over the same 30 mm.
             camera: Camera::default().coarser(4),
             levels: [1.0; 2],
             hysteresis: 0.0,
@@ -174,7 +177,7 @@ impl Default for World {
 }
 
 impl Default for Stated {
-    /// Everything rightly, a guide under a skin, and nothing said of errors.
+    /// All values are correct, the guide is under a skin, and no errors are stated.
     fn default() -> Self {
         Self {
             object: Object::sphere(RADIUS_M),
@@ -195,7 +198,7 @@ impl Default for Stated {
 }
 
 impl Sample {
-    /// The contacts at both loads; none where the simulator brings them along.
+    /// The contacts at both loads. `None` if the simulator computes them itself.
     fn states(self, options: &PressOptions) -> Option<Vec<ContactState>> {
         let material = options.object.material;
         let forces_n: Vec<f64> = options.loads.iter().map(|load| load.force_n).collect();
@@ -212,7 +215,7 @@ impl Sample {
     }
 }
 
-/// ν = ½ for the elements.
+/// Poisson's ratio ½ for the elements.
 const NEARLY_HALF: f64 = 0.4999;
 
 fn on_the_guide(
@@ -239,8 +242,9 @@ fn on_the_guide(
 }
 
 /// Johnson, Kendall and Roberts (1971, Proc. R. Soc. A 324, 301): a contact under the force F has
-/// the radius of one without adhesion under P₁ = F + Q, Q² = 6π w R P₁, and the pressure of that
-/// less Q/(2πa²)/√(1 − r²/a²). Where this is below zero nothing presses and no light leaks.
+/// the radius of a contact without adhesion under P₁ = F + Q, Q² = 6π w R P₁, and the pressure of
+/// that contact minus Q/(2πa²)/√(1 − r²/a²). Where this is below zero there is no pressure and no
+/// light.
 fn adhering(work: f64, options: &PressOptions) -> Vec<ContactState> {
     let attraction_n = 3.0 * std::f64::consts::PI * work * RADIUS_M;
     let mut hertz = options.clone();
@@ -266,7 +270,7 @@ fn adhering(work: f64, options: &PressOptions) -> Vec<ContactState> {
 }
 
 impl World {
-    /// Calibrated, pressed and measured as the user states it.
+    /// Calibrates, presses and measures with the values stated by the user.
     ///
     /// # Errors
     /// A check that is refused.
@@ -334,7 +338,7 @@ impl Stated {
         };
         let size = trial.simulation.pixel_size_m.map(|p| self.pixel_size * p);
         let pipeline = Pipeline::from_pairs(&trial.pairs, size, self.object).unwrap();
-        // The modulus of a ball needs no points, and its cautions are none of theirs.
+        // The modulus of a ball does not need control points and has none of their cautions.
         let points = match self.object {
             Object::Sphere { .. } => 8,
             _ => 200,

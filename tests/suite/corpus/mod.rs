@@ -1,14 +1,14 @@
-//! The inputs kept for the fuzz targets of the readers, once more: valid files of every kind,
-//! broken ones, and what once failed.
+//! Replays the inputs kept for the fuzz targets of the readers: valid files of every kind, damaged
+//! files, and inputs that once caused a failure.
 //!
-//! `fuzz/README.md` says how to look for more.
+//! `fuzz/README.md` describes how to search for more.
 #![allow(clippy::print_stdout)] // the input that is checked, shown where a check fails
 
 mod readers;
 
 use std::path::{Path, PathBuf};
 
-/// A folder of `tests/data/corpus` and what must hold of its inputs.
+/// A folder of `tests/data/corpus` and the check of its inputs.
 type Reader = (&'static str, fn(&[u8]));
 
 pub(crate) const READERS: [Reader; 5] = [

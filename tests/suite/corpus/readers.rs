@@ -1,7 +1,7 @@
-//! What must hold of every reader for any bytes: an answer within its documented range, or an error
-//! of one sentence that names the file.
+//! Requirements of every reader for any bytes: a result within its documented range, or an error of
+//! one sentence that names the file.
 //!
-//! Shared by the replay of the kept corpus and by the fuzz targets of `fuzz/`.
+//! Used by the replay of the kept corpus and by the fuzz targets in `fuzz/`.
 
 use ndarray::{Array, Dimension};
 use std::fmt::Display;
@@ -14,7 +14,7 @@ use tactile_files::scene::{Scene, read_contact_table};
 use tactile_files::sensor::{Sensor, SensorCalibration};
 use tactile_imaging::pipeline::FrameSource;
 
-/// A CSV file, read in every way that CSV files are read.
+/// A CSV file, read by every reader of CSV files.
 pub(crate) fn table(bytes: &[u8]) {
     let file = Scratch::new("table.csv", bytes);
     let finite = |values: &[f64]| assert!(values.iter().all(|v| v.is_finite()), "{values:?}");
@@ -109,8 +109,8 @@ pub(crate) fn toml(bytes: &[u8]) {
     answer(bytes, read_contact_table(&file.path));
 }
 
-/// The answer, if there is one; an error names the file and holds no value printed for debugging,
-/// unless it quotes one from the file.
+/// Returns the result, if there is one. An error must name the file and must not contain a value in
+/// debug format, unless it quotes one from the file.
 fn answer<T, E: Display>(bytes: &[u8], result: Result<T, E>) -> Option<T> {
     let sentence = match result {
         Ok(answer) => return Some(answer),
@@ -124,7 +124,7 @@ fn answer<T, E: Display>(bytes: &[u8], result: Result<T, E>) -> Option<T> {
         "file.toml",
     ];
     assert!(files.iter().any(|f| sentence.contains(f)), "{sentence}");
-    // What is quoted is quoted without control characters.
+    // Quotations contain no control characters.
     let file = String::from_utf8_lossy(bytes).replace(char::is_control, "");
     for printed in ["Some(", "Err("] {
         let quoted = file.contains(printed);

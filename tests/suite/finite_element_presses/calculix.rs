@@ -1,16 +1,16 @@
-//! Balls that another program pressed: its contacts beside those of this project's elements, and
-//! the moduli that are read from frames of them.
+//! Balls pressed with another program: its contacts compared with those of this project's elements,
+//! and the moduli measured in rendered frames of them.
 #![allow(clippy::print_stdout)]
 use super::{balls_of, error, solved};
 use tactile_imaging::fem::AppliedLoad;
 
 const FILE: &str = "calculix_presses.csv";
 
-/// That of its bodies.
+/// Poisson's ratio of the bodies.
 const POISSON_RATIO: f64 = 0.499;
 
-/// At one approach both programs find one force and one contact radius. `ALL_LOADS=1` solves every
-/// ball, not one in three.
+/// At the same approach both programs give the same force and contact radius. `ALL_LOADS=1` solves
+/// every ball instead of every third.
 #[test]
 fn contacts_are_those_of_another_program() {
     let step = if std::env::var_os("ALL_LOADS").is_some() {
@@ -40,7 +40,8 @@ fn contacts_are_those_of_another_program() {
     }
 }
 
-/// Rendered with the camera's noise and read blindly, two loads at a time.
+/// Rendered with the noise of the camera and measured without knowledge of the truth, two loads at
+/// a time.
 #[test]
 fn moduli_of_balls_of_another_program_are_right() {
     for (k, ball) in balls_of(FILE).iter().enumerate() {

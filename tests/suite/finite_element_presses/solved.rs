@@ -1,4 +1,4 @@
-//! Presses and tables solved when asked for.
+//! Presses and tables that are solved on request.
 
 use super::{Ball, guide};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -10,13 +10,14 @@ use tactile_imaging::fem::{
 };
 use tactile_simulate::ContactState;
 
-/// A ball's radius and the layers (thickness, modulus) that it is pressed on; none is a rigid flat.
+/// The radius of a ball and the layers (thickness, modulus) below it. An empty list is a rigid
+/// flat.
 type Sensor = (f64, &'static [(f64, f64)]);
 
 const PAPER: &[(f64, f64)] = &[(2e-3, 136e3), (3e-3, 80e3), (5e-3, 34e3)];
 
-/// The paper's guide under balls of 3 and 8 mm, single layers that contacts of 1.2 ball radii take
-/// to a/h of 1 and 1.5, rigid flats.
+/// The guide of the paper under balls of 3 and 8 mm, single layers on which contacts of 1.2 ball
+/// radii have a/h of 1 and 1.5, and rigid flats.
 pub(super) const SENSORS: [Sensor; 6] = [
     (3e-3, PAPER),
     (8e-3, PAPER),
@@ -26,11 +27,11 @@ pub(super) const SENSORS: [Sensor; 6] = [
     (20e-3, &[]),
 ];
 
-/// The largest a/R that the laws and the tables are asked for. On a guide softer than the ball,
-/// approaches that a rigid flat would take to 1.15 may exceed it.
+/// The largest a/R of the laws and the tables. On a guide that is softer than the ball, approaches
+/// that would give 1.15 on a rigid flat may exceed it.
 const LARGEST_RATIO: f64 = 1.2;
 
-/// The elements' Poisson ratio where ½ is meant.
+/// Poisson's ratio of the elements for ½.
 const POISSON_RATIO: f64 = 0.4999;
 
 pub(super) fn table((radius_m, layers): &Sensor) -> Arc<ContactTable> {
@@ -42,15 +43,15 @@ pub(super) fn table((radius_m, layers): &Sensor) -> Arc<ContactTable> {
     Arc::new(table.unwrap())
 }
 
-/// A ball of 30 to 250 kPa on one of the sensors at four loads, a/R 0.1 to 1.2, on a coarser or a
-/// finer mesh than the tables'.
+/// A ball of 30 to 250 kPa on one of the sensors at four loads, a/R 0.1 to 1.2, on a coarser or
+/// finer mesh than that of the tables.
 pub(super) fn ball(seed: u64) -> Ball {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (radius_m, layers) = SENSORS[seed as usize % SENSORS.len()];
     let modulus = 30e3 * (250.0_f64 / 30.0).powf(rng.random::<f64>());
     let fineness = if rng.random::<bool>() { 4 } else { 7 };
-    // Approaches at which a/R is about x: Hertz's a²/R, less what large strain and the ball's far
-    // side take off.
+    // Approaches at which a/R is about x: Hertz's a²/R minus the effect of large strain and of the
+    // far side of the ball.
     let part = if layers.is_empty() { 0.75 } else { 0.9 };
     let ratios = [0.12, 0.45].map(|from: f64| {
         let smaller = from * (0.85_f64 / 0.45).powf(1.6 * rng.random::<f64>());
@@ -77,7 +78,8 @@ pub(super) fn ball(seed: u64) -> Ball {
     }
 }
 
-/// A press of a ball on layers (thickness, modulus), whose guide has another rim than the tables'.
+/// A press of a ball on layers (thickness, modulus). The rim of the guide differs from that of the
+/// tables.
 pub(super) fn press(
     radius_m: f64,
     layers: &[(f64, f64)],

@@ -1,7 +1,7 @@
-//! Force, centroid and contact radius on simulated frames, against the scene's truth.
+//! Force, centroid and contact radius in simulated frames, compared with the truth of the scene.
 //!
-//! The default camera's noise is 1 % of the brightest signal (2 of 200 grey levels, most of it
-//! photons).
+//! The noise of the default camera is 1 % of the brightest signal (2 of 200 grey levels, mostly
+//! photon noise).
 #![allow(clippy::print_stdout)]
 
 mod study;
@@ -32,8 +32,8 @@ fn press(camera: Camera) -> PressOptions {
     }
 }
 
-/// The sensor's true calibration, with its error left out: what is tested is the frames' share of
-/// the error.
+/// The true calibration of the sensor without its error: the test covers only the error from the
+/// frames.
 fn calibration(scene: &PressScene) -> LinearCalibration {
     let camera = scene.options().camera;
     let newton_per_grey =
@@ -45,7 +45,7 @@ fn calibration(scene: &PressScene) -> LinearCalibration {
     LinearCalibration::fit(&pairs, &Default::default()).unwrap()
 }
 
-/// A reference with noise of its own for every seed.
+/// A reference with different noise for every seed.
 fn dark(scene: &PressScene, seed: u64) -> Array2<u8> {
     PressScene::new(PressOptions {
         seed,
@@ -62,7 +62,8 @@ fn a_thousand_seeds() {
     assert!(s.force.worst() < 2e-3 && s.radius.worst() < 3e-3);
     assert!(s.centroid.iter().all(|c| c.rms() < 0.01) && s.centre.rms() < 0.01);
     for errors in s.all() {
-        // 68.3 % is the normal law's; the binomial spread of a thousand seeds is 1.5 %.
+        // 68.3 % is expected for a normal distribution. The binomial standard deviation for a
+        // thousand seeds is 1.5 %.
         assert!(
             (0.66..=0.71).contains(&errors.inside_one_sigma()),
             "{}: {}",
@@ -74,8 +75,8 @@ fn a_thousand_seeds() {
 
 #[test]
 fn vignetting_is_corrected_on_request() {
-    // In a corner, where the lens takes 2 % of the light; the scene's calibration belongs to the
-    // middle.
+    // In a corner, where the lens absorbs 2 % of the light. The calibration of the scene is valid
+    // for the middle.
     let mut options = press(camera());
     options.camera.vignetting = 0.03;
     options.centre_px = Some([60.3, 51.8]);
@@ -111,7 +112,7 @@ fn blur_oblong_pixels_and_small_contacts() {
         println!("{name}");
         let scene = PressScene::new(options).unwrap();
         let s = study(&scene, 200, &ForceOptions::default());
-        // Three standard deviations of what the noise allows; 200 seeds: 68.3 ± 3.3 %.
+        // Three standard deviations of the noise. 200 seeds: 68.3 ± 3.3 %.
         assert!(s.force.worst() < 5e-3 && s.radius.rms() < 1e-3 && s.centroid[0].rms() < 0.01);
         for errors in [&s.force, &s.centre, &s.radius] {
             assert!(
@@ -159,13 +160,13 @@ fn false_alarms_are_as_rare_as_stated() {
                 .is_some()
         })
         .count();
-    // One in a thousand is stated: more than five has a probability of 6e-4.
+    // The stated rate is one in a thousand. More than five have a probability of 6e-4.
     assert!(alarms <= 5, "{alarms}");
 }
 
 #[test]
 fn faint_contacts_are_found() {
-    // A peak of three grey levels, under three standard deviations of a difference.
+    // A peak of three grey levels, below three standard deviations of a difference.
     let gain = Gain::PeakGrey(3.0);
     let scene = PressScene::new(PressOptions {
         gain,
@@ -176,7 +177,7 @@ fn faint_contacts_are_found() {
     assert!(s.force.rms() < 0.03, "{}", s.force.rms());
 }
 
-/// Nothing here may panic, and what is wrong must show.
+/// No case may panic, and errors must be reported.
 #[test]
 fn hostile_scenes_end_civilly() {
     let base = press(camera());

@@ -1,4 +1,4 @@
-//! One scene measured under many seeds: errors, and whether their stated sizes are right.
+//! One scene measured with many seeds: errors, and whether their stated sizes are correct.
 
 use super::{calibration, dark};
 use tactile_imaging::force::{
@@ -104,7 +104,7 @@ pub(super) fn study_with(
             s.centroid[k].add(contact.centroid_px[k], truth.centroid_px[k], 1.0);
         }
         s.centre.add(fit.centre_px[0], truth.centre_px[0], 1.0);
-        // These contacts are Hertz's: the radius's error is that of noise alone.
+        // These contacts are Hertz's: the error of the radius is only that of the noise.
         let noise = fit.radius_m.part(Source::Noise);
         s.radius.add(
             Estimate::new(fit.radius_m.value, noise),

@@ -1,13 +1,13 @@
-//! Surfaces over blocks of pixels, as large as the control points allow, are those over single
-//! pixels.
+//! Surfaces over blocks of pixels, as large as the control points allow, agree with those over
+//! single pixels.
 #![allow(clippy::print_stdout)]
 use nalgebra::Matrix3;
 use tactile_imaging::pipeline::{Binning, ContactSurface};
 use tactile_simulate::Trial;
 use tactile_simulate::{CalibrationRun, Camera, PressOptions};
 
-/// Half the paper's resolution: contacts of some 80 pixels' radius, whose blocks for 60 points are
-/// 4 × 4.
+/// Half of the paper's resolution: contacts of about 80 pixels' radius, with blocks of 4 × 4 for 60
+/// points.
 fn trial() -> Trial {
     let camera = Camera {
         shape: [521, 696],
@@ -21,7 +21,7 @@ fn trial() -> Trial {
     Trial::new(options, &CalibrationRun::default()).unwrap()
 }
 
-/// Of Hertz's contact at 0.7 N.
+/// Radius of Hertz's contact at 0.7 N.
 const RADIUS_M: f64 = 3.27e-3;
 
 struct Answer {
@@ -45,8 +45,8 @@ fn answer(trial: &Trial, binning: Binning) -> Answer {
     }
 }
 
-/// Heights above the rim: those of the blocks against the means of their pixels', as shares of the
-/// greatest.
+/// Largest difference of heights above the rim between the blocks and the means of their pixels, as
+/// a fraction of the largest height.
 fn largest_difference(blocks: &ContactSurface, pixels: &ContactSurface) -> f64 {
     let side = blocks.binning;
     let top = pixels.surface.heights.iter().copied().fold(0.0, f64::max);
@@ -79,7 +79,7 @@ fn automatic_blocks_leave_heights_and_strain_as_they_are() {
         "{} pixels a side: heights {height:.4}, strains {} {} ± {error}",
         blocks.surface.binning, blocks.strain, pixels.strain
     );
-    // Blocks know the rim, where the surface is steepest, to their own width.
+    // The rim, at which the surface is steepest, is accurate to the width of a block.
     let radius = RADIUS_M / blocks.surface.pixel_size_m[0];
     assert!(height < 1.0 / radius, "{height}");
     for (k, (a, b)) in blocks.strain.iter().zip(&pixels.strain).enumerate() {

@@ -1,7 +1,8 @@
-//! Hostile presses: a typed error or a flagged answer, never a panic, never a silent NaN.
+//! Hostile presses: each must give a typed error or a flagged result, never a panic and never a
+//! silent NaN.
 //!
-//! 500 presses are some three of every pair of troubles; `HOSTILE=10000` takes more, as `.ci/run
-//! studies` does in an optimised build.
+//! 500 presses contain about three of every pair of defects. `HOSTILE=10000` runs more, as does
+//! `.ci/run studies` in an optimised build.
 use crate::hostile::Hostile;
 use crate::sound;
 use ndarray::{Array2, s};
@@ -15,8 +16,8 @@ use tactile_simulate::{Camera, PressOptions};
 const SHAPE: [usize; 2] = [36, 44];
 const SEEDS: usize = 24;
 
-/// Reference and frame of every kind of trouble and every seed, made once; the kind after the last
-/// is a sound press.
+/// Reference and frame of every kind of defect and every seed, simulated once. The kind after the
+/// last is a valid press.
 fn frames(kind: usize, seed: usize) -> &'static [Array2<u8>; 2] {
     static FRAMES: OnceLock<Vec<[Array2<u8>; 2]>> = OnceLock::new();
     let all = || {
@@ -45,7 +46,7 @@ fn simulate(kind: usize, seed: u64) -> [Array2<u8>; 2] {
     [made.reference, made.frames[0].clone()]
 }
 
-/// What is done to a frame on its way.
+/// Damages a frame.
 fn spoil(frame: &Array2<u8>, how: u8, noise: u64) -> Array2<u8> {
     let (rows, columns) = frame.dim();
     match how {
@@ -94,7 +95,7 @@ fn check(kinds: [usize; 2], seed: usize, spoilt: [u8; 2], object: u8) {
     let mut press = pipeline.press(reference.view()).unwrap();
     press.add_frame(first.view());
     press.add_frame(second.view());
-    // Two thirds go without surfaces where they can, to be quick.
+    // Two thirds are measured without surfaces, if possible, to save time.
     if !(seed + usize::from(object)).is_multiple_of(3) {
         return sound::modulus_alone(&case, &press);
     }
@@ -104,7 +105,7 @@ fn check(kinds: [usize; 2], seed: usize, spoilt: [u8; 2], object: u8) {
         Some(Hostile::CutByEdge | Hostile::InCorner | Hostile::FillsFrame)
     );
     let several = Hostile::ALL.get(kinds[0]) == Some(&Hostile::SeveralContacts);
-    // The first frame is as it was simulated.
+    // The first frame remains as simulated.
     if spoilt[0] > 3 {
         let at_edge = |f: &Flag| matches!(f, Flag::TouchesEdge { frame: 0 });
         let of_several = |f: &Flag| matches!(f, Flag::SeveralContacts { frame: 0, .. });

@@ -1,4 +1,5 @@
-//! The pipeline pulls: what is not asked for is not computed, what is skipped changes no answer.
+//! The pipeline computes on demand: only requested results are computed, and skipped stages change
+//! no result.
 mod blocks;
 mod hostile;
 mod on_demand;
@@ -15,7 +16,7 @@ mod time;
 use tactile_imaging::pipeline::{PipelineError, Press, SkipReason, Stage};
 use tactile_simulate::{Camera, Trial};
 
-/// A press seen by a camera of 348 × 260 pixels: a sixteenth of the default's, to be quick.
+/// A press seen by a camera of 348 × 260 pixels: a sixteenth of the default, to save time.
 fn trial(forces: &[f64], seed: u64) -> Trial {
     crate::common::trial(Camera::default().coarser(4), forces, seed)
 }
@@ -31,16 +32,16 @@ fn nothing_runs_before_it_is_asked_for() {
     let press = trial.press(&pipeline).unwrap();
     assert_eq!(runs(&press), [0; 6]);
     press.contact(0).unwrap();
-    // Force alone never touches a surface.
+    // The force alone needs no surface.
     assert_eq!(runs(&press), [1, 0, 0, 0, 0, 0]);
     press.modulus().unwrap();
-    // A ball's modulus takes the contacts alone.
+    // The modulus of a ball needs only the contacts.
     assert_eq!(runs(&press), [2, 0, 0, 0, 0, 1]);
     press.surface(1).unwrap();
     assert_eq!(runs(&press), [2, 1, 0, 0, 0, 1]);
     press.strain(1).unwrap();
     press.strain(1).unwrap();
-    // What is known is not computed again.
+    // Known results are not computed again.
     assert_eq!(runs(&press), [2, 2, 2, 1, 1, 1]);
 }
 

@@ -1,4 +1,4 @@
-//! Frames that are read when a stage needs them say what frames in memory say.
+//! Frames that are read when a stage needs them give the same results as frames in memory.
 use super::trial;
 use tactile_imaging::pipeline::PipelineError;
 

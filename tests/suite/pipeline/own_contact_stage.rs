@@ -1,11 +1,11 @@
-//! A contact stage of a user's own may err.
+//! A user-defined contact stage may return wrong results.
 use crate::common::press_of;
 use ndarray::{Array2, ArrayView2};
 use tactile_imaging::force::{ForceError, ReferenceFrame};
 use tactile_imaging::pipeline::{ContactStage, FrameContact, LightContact, PipelineError};
 use tactile_imaging::{Object, Pipeline};
 
-/// Light, whose mask or region is then spoiled.
+/// Detection by light, with a mask or region that is then damaged.
 struct Spoiled {
     light: LightContact,
     spoil: fn(&mut FrameContact),
@@ -38,7 +38,7 @@ fn frames() -> [Array2<u8>; 2] {
 
 #[test]
 fn a_mask_that_does_not_fit_is_an_error_and_no_panic() {
-    // The first and the last row of the region become others.
+    // Replaces the first and the last row of the region.
     fn rows(contact: &mut FrameContact, change: fn([usize; 2]) -> [usize; 2]) {
         let region = contact.region.as_mut().unwrap();
         [region.row_start, region.row_end] = change([region.row_start, region.row_end]);

@@ -1,4 +1,4 @@
-//! Estimators and laws of one's own count the guide that the pipeline states.
+//! User-defined estimators and laws take into account the guide of the pipeline.
 use super::trial;
 use crate::common;
 use tactile_imaging::elasticity::ElasticityError;
@@ -10,7 +10,7 @@ use tactile_imaging::elasticity::modulus::{
 };
 use tactile_simulate::Camera;
 
-/// Hertz's law of a contact radius, without slopes.
+/// Hertz's law of the contact radius, without derivatives.
 struct OwnLaw {
     radius_m: f64,
 }
@@ -26,7 +26,7 @@ impl ContactLaw for OwnLaw {
     }
 }
 
-/// The weighted mean of Hertz's E*, less the guide's compliance.
+/// The weighted mean of Hertz's E*, minus the compliance of the guide.
 struct OwnEstimator;
 
 impl ModulusEstimator for OwnEstimator {
@@ -64,8 +64,8 @@ impl ModulusEstimator for OwnEstimator {
     }
 }
 
-/// Forty presses under other forces and noise: an own law and an own estimator of the physics of a
-/// built-in one give its modulus and its error.
+/// Forty presses with different forces and noise: a user-defined law and estimator with the physics
+/// of a built-in one give the same modulus and error.
 #[test]
 fn own_physics_gives_what_the_same_built_in_physics_gives() {
     for seed in 0..40 {
@@ -93,7 +93,7 @@ fn own_physics_gives_what_the_same_built_in_physics_gives() {
                 found.standard_error_pa / expected.standard_error_pa,
             ];
             for ratio in ratios {
-                // The weights of the loads differ by what the law adds to their errors.
+                // The weights of the loads differ because of the error of the law.
                 let estimator = found.estimator;
                 assert!((ratio - 1.0).abs() < 0.01, "{seed} {estimator}: {ratios:?}");
             }
@@ -102,7 +102,7 @@ fn own_physics_gives_what_the_same_built_in_physics_gives() {
     }
 }
 
-/// What takes the guide for rigid says so, and has not the name of what counts it.
+/// An estimator that treats the guide as rigid has a caution and a different name.
 #[test]
 fn an_estimator_that_ignores_the_guide_has_a_caution_and_another_name() {
     let trial = trial(&[0.7, 1.2], 3);

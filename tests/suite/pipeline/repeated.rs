@@ -1,4 +1,4 @@
-//! What frames say that repeat others, are cut, or do not belong to their reference.
+//! Results of frames that are repeated, cut by the border, or do not belong to their reference.
 use super::trial;
 use crate::common::press_of;
 use ndarray::{Array2, Axis, s};
@@ -17,7 +17,7 @@ fn a_frame_that_is_given_twice_counts_once() {
     assert_eq!(often.standard_error_pa, once.standard_error_pa);
     assert_eq!(often.loads.len(), 102);
     assert_eq!(often.loads.iter().filter(|load| load.used).count(), 2);
-    // The estimators that use strain count it once as well.
+    // The estimators that use strain also count it once.
     let series = press.load_series().unwrap();
     let loads = series.loads().iter();
     assert_eq!(loads.filter(|load| load.mean_strain.is_some()).count(), 1);
@@ -65,17 +65,17 @@ fn darker_frames_are_flagged() {
     let (none, text) = drift(0);
     assert_eq!(none, None, "{text}");
     let (found, text) = drift(3);
-    // To the noise of the median.
+    // Within the noise of the median.
     assert!(found.is_some_and(|grey| (grey + 3.0).abs() < 0.1), "{text}");
 }
 
-/// One contact of two is cut by the border: its force and radius are wrong, and the modulus is the
-/// other's.
+/// One of two contacts is cut by the border: its force and radius are wrong, and the modulus is
+/// that of the other.
 #[test]
 fn a_contact_that_the_border_cuts_is_left_out() {
     let trial = trial(&[0.7, 1.2], 6);
     let pipeline = trial.pipeline().unwrap();
-    // The contacts' middle is (174, 130); their radii are some 38 and 45 pixels.
+    // The centre of the contacts is (174, 130), and their radii are about 38 and 45 pixels.
     let cut = |left: usize, frames: &[usize]| {
         let cut = |image: &Array2<u8>| image.slice(s![.., left..]).to_owned();
         let reference = cut(&trial.simulation.reference);
@@ -87,18 +87,18 @@ fn a_contact_that_the_border_cuts_is_left_out() {
     assert!(measurement.flags.contains(&edge), "{measurement}");
     let alone = cut(130, &[0]).modulus().unwrap();
     let modulus = measurement.youngs_modulus_pa.unwrap();
-    // Each load is weighted anew in a series: rounding.
+    // The loads of a series have new weights: rounding.
     let relative = modulus.value / alone.youngs_modulus_pa - 1.0;
     assert!(relative.abs() < 1e-12, "{relative:e}");
-    // Where every contact is cut there is no modulus.
+    // If every contact is cut, there is no modulus.
     let measurement = cut(150, &[1]).measure();
     assert!(measurement.flags.contains(&Flag::TouchesEdge { frame: 0 }));
     let modulus = measurement.youngs_modulus_pa;
     assert_eq!(modulus.unwrap_err(), PipelineError::NoWholeContact);
 }
 
-/// Pixels a fifth wider than stated: the contact looks longer than wide, and the interval of the
-/// modulus, 30 % off, is as much wider.
+/// Pixels a fifth wider than stated: the contact appears longer than wide. The modulus is wrong by
+/// 30 %, and its interval is wider by the same amount.
 #[test]
 fn a_caution_about_the_shape_widens_the_interval() {
     let trial = trial(&[0.7, 1.2], 6);
@@ -122,8 +122,8 @@ fn a_caution_about_the_shape_widens_the_interval() {
     assert!(holds, "{modulus:?}");
 }
 
-/// A punch touches with its whole face: a ball's contact, said to be that of a wider punch, has a
-/// caution, and its radius and stress cannot be told.
+/// A punch touches with its whole face. The contact of a ball, stated to be that of a wider punch,
+/// has a caution, and its radius and stress are undetermined.
 #[test]
 fn a_contact_that_is_not_the_punchs_has_no_sure_stress() {
     let trial = trial(&[0.7], 6);

@@ -1,4 +1,4 @@
-//! Results: sentences for people, JSON for programs, and what may cross threads.
+//! Results: sentences for users, JSON for programs, and types that can be sent between threads.
 use super::trial;
 use tactile_imaging::pipeline::{BallFit, PipelineError, Press, Report, Session, Update};
 use tactile_imaging::sfs::Domain;
@@ -16,7 +16,7 @@ fn everything_can_cross_threads() {
     crosses::<tactile_simulate::FrameStream>();
 }
 
-/// The sentence of a result; it must be writable as JSON.
+/// The sentence of a result. The result must also be serialisable as JSON.
 fn told<T: std::fmt::Display + serde::Serialize>(result: &T) -> String {
     assert!(!serde_json::to_value(result).unwrap().is_null());
     result.to_string()

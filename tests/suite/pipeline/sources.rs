@@ -1,4 +1,4 @@
-//! Frames from a batch, and of another size.
+//! Frames from a batch, and frames of another size.
 use super::trial;
 use crate::common::press_of;
 use ndarray::Array2;

@@ -1,4 +1,4 @@
-//! The strain's stated error holds in frames of every size, or the result is flagged.
+//! The stated error of the strain is correct for frames of every size, or the result has a flag.
 #![allow(clippy::print_stdout)]
 use std::collections::BTreeMap;
 use tactile_imaging::pipeline::Flag;
@@ -8,8 +8,8 @@ use tactile_simulate::{CalibrationRun, Camera, PressOptions};
 /// Widths and heights of frames that show the same 30 mm × 22.5 mm.
 const SIZES: [[usize; 2]; 5] = [[174, 130], [348, 260], [464, 347], [696, 521], [1392, 1042]];
 
-/// The paper's press in a camera of this size; every seed has its own noise and its own place
-/// between the pixels.
+/// The paper's press with a camera of this size. Every seed has different noise and another
+/// position relative to the pixels.
 fn trial([width, height]: [usize; 2], seed: u64) -> Trial {
     let fraction = |step: f64| (step * seed as f64).fract() - 0.5;
     let camera = Camera {
@@ -29,7 +29,7 @@ fn trial([width, height]: [usize; 2], seed: u64) -> Trial {
     Trial::new(options, &CalibrationRun::default()).unwrap()
 }
 
-/// Whether the measurement itself says that its strain may be wrong.
+/// Whether the flags of the measurement warn that its strain may be wrong.
 fn cautions(flags: &[Flag]) -> bool {
     flags.iter().any(|flag| {
         matches!(
@@ -39,9 +39,9 @@ fn cautions(flags: &[Flag]) -> bool {
     })
 }
 
-/// Every mean strain lies within three stated standard errors of the truth, or a caution says that
-/// it may not: 3 is what one normal number in 370 exceeds, and the errors are stated for the worst
-/// size. `STRAIN_SEEDS` takes more draws of each size than two.
+/// Every mean strain lies within three stated standard errors of the true value, or a caution warns
+/// that it may not. One of 370 normally distributed values exceeds three, and the errors are stated
+/// for the worst size. `STRAIN_SEEDS` sets the number of draws per size (two by default).
 #[test]
 fn strains_are_within_their_errors_at_every_size_or_flagged() {
     let seeds = test_support::draws("STRAIN_SEEDS", 2);

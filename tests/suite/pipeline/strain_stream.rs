@@ -1,4 +1,4 @@
-//! Strain along a stream: the truth's and the same as a press's, with less work.
+//! Strain in a stream: it agrees with the truth and with that of a press, and needs less work.
 #![allow(clippy::print_stdout)]
 use super::trial;
 use nalgebra::Matrix3;
@@ -13,7 +13,7 @@ fn session(trial: &Trial, pipeline: &Pipeline) -> Session {
     Session::new(pipeline, &[trial.simulation.reference.view()]).unwrap()
 }
 
-/// The strains of all frames against the first, and what the matches took.
+/// The strains of all frames relative to the first, and the cost of the matches.
 struct Followed {
     means: Vec<Matrix3<f64>>,
     iterations: usize,
@@ -48,7 +48,8 @@ fn two_frames_of_a_stream_strain_as_two_of_a_press() {
     assert_eq!(runs, [2, 2, 2, 1, 1, 0]);
 }
 
-/// The apparent surface scales by (F/F₀)^⅓ about its centre, so that e_xx = e_yy = ½((F/F₀)^⅔ − 1).
+/// The apparent surface is scaled by (F/F₀)^⅓ about its centre, so that e_xx = e_yy = ½((F/F₀)^⅔ −
+/// 1).
 #[test]
 fn a_streams_strain_is_that_of_the_scene() {
     let forces = [0.7, 0.8, 0.9, 1.0, 1.1, 1.2];
@@ -58,7 +59,7 @@ fn a_streams_strain_is_that_of_the_scene() {
         let truth = 0.5 * ((force / forces[0]).powf(2.0 / 3.0) - 1.0);
         for k in 0..2 {
             println!("{force} N: {} against {truth}", mean[(k, k)]);
-            // 200 points on so few pixels know the mean strain to some 4 %.
+            // With 200 points on so few pixels the mean strain is accurate to about 4 %.
             assert!(
                 (mean[(k, k)] / truth - 1.0).abs() < 0.06,
                 "{mean} against {truth}"
@@ -67,7 +68,7 @@ fn a_streams_strain_is_that_of_the_scene() {
     }
 }
 
-/// A match may end in another of the pairings that fit alike.
+/// A match may end in a different pairing with an equally good fit.
 fn agree(expected: &StrainSummary, mean: &Matrix3<f64>) {
     let gap = (mean - expected.mean).abs();
     let allowed = 0.5 * expected.standard_error;
@@ -98,7 +99,7 @@ fn matches_that_go_on_from_the_last_one_strain_as_those_made_anew() {
         skips.map(|skip| skip.frames).sum::<usize>()
     };
     assert_eq!(skipped(SkipReason::NearLastAnswer), 4);
-    // The surface of the first load need not be made again for the five that follow.
+    // The surface of the first load is not computed again for the five that follow.
     assert_eq!(skipped(SkipReason::KeptFromBefore), 5);
     assert_eq!(on.session.report().work(Stage::Surface).runs, 6);
 }
@@ -114,7 +115,7 @@ fn an_estimator_that_needs_strain_gets_its_modulus_from_the_stream() {
     let press = trial.press(&pipeline).unwrap();
     let expected = press.modulus().unwrap();
     let mut session = session(&trial, &pipeline);
-    // No strain yet.
+    // There is no strain yet.
     assert!(matches!(session.modulus(), Err(PipelineError::Modulus(_))));
     for frame in &trial.simulation.frames {
         session.push(frame.view()).unwrap();
@@ -122,7 +123,7 @@ fn an_estimator_that_needs_strain_gets_its_modulus_from_the_stream() {
     }
     let found = session.modulus().unwrap();
     assert_eq!(found.estimator, expected.estimator);
-    // The same loads and, to what two equally good matches differ by, the same strains.
+    // The same loads and, up to the difference between two equally good matches, the same strains.
     let ratio = found.youngs_modulus_pa / expected.youngs_modulus_pa;
     assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
 }
@@ -171,7 +172,7 @@ fn an_estimator_can_be_chosen_and_a_wrong_one_says_what_it_needs() {
     };
     use EstimatorChoice::*;
     assert_eq!(modulus(Best), modulus(SphereOnWaveguide));
-    // No surface for a ball.
+    // A ball needs no surface.
     assert_eq!(modulus(Sphere).1, 0);
     let laws = [
         (PaperRatio, EstimatorKind::PaperRatio, 3),
@@ -195,8 +196,8 @@ fn an_estimator_can_be_chosen_and_a_wrong_one_says_what_it_needs() {
     );
 }
 
-/// A frame leaves nothing in the memory that the next one works in, but the answer that its match
-/// begins from.
+/// A frame leaves no trace in the working memory of the next, except the result from which the next
+/// match starts.
 #[test]
 fn frames_in_between_leave_no_trace() {
     let trial = trial(&[0.7, 1.2, 0.4, 1.0], 5);

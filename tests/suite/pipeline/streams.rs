@@ -1,4 +1,4 @@
-//! Sessions: shear followed, drift watched, memory and answer kept.
+//! Sessions: shear is followed, drift is monitored, and memory and results stay constant.
 #![allow(clippy::print_stdout)]
 use super::trial;
 use tactile_imaging::force::{Estimate, ShearCalibration, ShearMeasurement};
@@ -28,15 +28,15 @@ fn shear_is_the_way_of_the_centroid_since_contact_began() {
     assert_eq!(forces(&shear(first).unwrap()), [0.0; 2]);
     let found = shear(second).unwrap();
     for (force, truth) in found.force_n.iter().zip(shear_n) {
-        // Six standard errors, and a hundredth of a pixel for what rounding and vignetting do to
-        // the centroid.
+        // Six standard errors, plus a hundredth of a pixel for the effect of rounding and
+        // vignetting on the centroid.
         let tolerance = 6.0 * force.standard_error + 0.01 * 86.2e-6 * stiffness[0];
         let miss = (force.value - truth).abs();
         assert!(miss < tolerance, "{force} N, true {truth} N");
     }
     assert_eq!(shear(second).unwrap().displacement_m, found.displacement_m);
     assert!(shear(empty.view()).is_none());
-    // A new contact starts anew.
+    // A new contact starts from zero.
     assert_eq!(forces(&shear(second).unwrap()), [0.0; 2]);
 }
 
@@ -59,8 +59,8 @@ fn drift_of_the_light_is_seen_in_frames_without_contact() {
     assert!(session.drift().caution.is_some());
 }
 
-/// The answer after 4 000 frames is that after the first cycles, and the truth: the loads kept
-/// apart are full after a few hundred.
+/// The result after 4 000 frames equals that after the first cycles and the truth: the list of
+/// separate loads is full after a few hundred frames.
 #[test]
 fn four_thousand_frames_leave_memory_and_answer_alone() {
     let options = PressOptions {
@@ -99,15 +99,15 @@ fn four_thousand_frames_leave_memory_and_answer_alone() {
     let drift = late.youngs_modulus_pa / early.youngs_modulus_pa - 1.0;
     let error = late.youngs_modulus_pa / trial.simulation.youngs_modulus_pa - 1.0;
     println!("drift {drift:+.5}, error {error:+.5}");
-    // Two and a half of the early estimate's standard errors, most of which (the calibration's)
-    // both have in common.
+    // Two and a half standard errors of the early estimate. Most of them (from the calibration) are
+    // common to both estimates.
     assert!(drift.abs() < 0.01, "drift {drift}");
     assert!(error.abs() < 0.03, "error {error}");
     assert!(session.drift().caution.is_none(), "{:?}", session.drift());
 }
 
-/// Surface, control points, match, spline and strain of a frame work in the memory of the frames
-/// before.
+/// Surface, control points, match, spline and strain of a frame reuse the memory of the previous
+/// frames.
 #[test]
 fn following_strain_allocates_nothing_after_warm_up() {
     let trial = trial(&[0.7, 0.8, 0.95, 1.1, 1.2], 1);

@@ -1,4 +1,4 @@
-//! Frames with their times: a sample that relaxes, a sensor whose gain drifts, and neither.
+//! Frames with times: a relaxing sample, a sensor with drifting gain, and neither.
 #![allow(clippy::print_stdout)]
 use super::trial;
 use crate::common::press_of;
@@ -10,13 +10,13 @@ use tactile_simulate::{Gain, PressLoad, PressScene, Trial};
 
 const TIMES_S: [f64; 8] = [0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0];
 
-/// E(t) of a sample that relaxes by a third with 2 s.
+/// E(t) of a sample that relaxes by a third with a time constant of 2 s.
 fn relaxing(time_s: f64) -> f64 {
     80e3 + 40e3 * (-time_s / 2.0).exp()
 }
 
-/// Frames at [`TIMES_S`] of a ball: modulus, force, and by which factor the sensor's gain has
-/// changed since its calibration.
+/// Frames of a ball at [`TIMES_S`]: modulus, force, and the gain of the sensor relative to that of
+/// its calibration.
 fn frames(trial: &Trial, at: impl Fn(f64) -> [f64; 3]) -> Vec<Array2<u8>> {
     let frame = |(&time_s, repeat): (&f64, u32)| {
         let [modulus_pa, force_n, gain] = at(time_s);
@@ -29,7 +29,7 @@ fn frames(trial: &Trial, at: impl Fn(f64) -> [f64; 3]) -> Vec<Array2<u8>> {
     TIMES_S.iter().zip(1..).map(frame).collect()
 }
 
-/// What is measured of frames at [`TIMES_S`], with the gauge's forces or without.
+/// Measurement of frames at [`TIMES_S`], with or without the forces of the gauge.
 fn measured(trial: &Trial, frames: &[Array2<u8>], gauge_n: Option<f64>) -> Measurement {
     let pipeline = trial.pipeline().unwrap().with_control_points(60);
     let mut press = pipeline.press(trial.simulation.reference.view()).unwrap();
@@ -76,7 +76,7 @@ fn a_held_approach_gives_the_relaxation() {
         let told = |flag: &Flag| matches!(flag, Flag::SampleRelaxes { .. });
         assert!(measurement.flags.iter().any(told), "{measurement}");
     }
-    // Of six, four or fewer are held with a probability of 3 %.
+    // Four or fewer of six have a probability of 3 %.
     assert!(held.iter().all(|held| *held >= SEEDS - 1), "{held:?}");
 }
 
@@ -106,19 +106,19 @@ fn a_gauge_tells_a_falling_gain_from_a_relaxing_sample() {
         let count = found.flags.iter().filter(is).count();
         assert_eq!(count, 1, "{found}");
     };
-    // Without a gauge it looks like a sample that relaxes over minutes.
+    // Without a gauge it resembles a sample that relaxes over minutes.
     flags(
         &measured(&trial, &falling, None),
         |flag| matches!(flag, Flag::ChangesWithTime { change } if *change < -0.1),
     );
-    // With one the gain is known to fall, and the moduli with the gauge's forces do not change.
+    // With a gauge the falling gain is recognised, and the moduli do not change.
     let gauged = measured(&trial, &falling, Some(0.3));
     flags(
         &gauged,
         |flag| matches!(flag, Flag::SensorDrifts { change } if (change + 0.15).abs() < 0.02),
     );
     assert_eq!(gauged.time.unwrap().change, TimeDependence::Steady);
-    // A rising gain needs none: no sample stiffens.
+    // A rising gain needs no gauge: samples do not become stiffer.
     let told = measured(&trial, &rising, None).time.unwrap();
     assert!(
         matches!(told.change, TimeDependence::Drifts { .. }),

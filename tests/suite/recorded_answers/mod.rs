@@ -1,24 +1,25 @@
-//! The numbers of small simulated scenes, compared with those recorded in
+//! The results of small simulated scenes, compared with those recorded in
 //! `tests/suite/recorded_answers/answers.txt`.
 //!
-//! A change that is meant to leave every answer as it is shows that here. A change that is meant to
-//! move answers records them anew: `RECORD_ANSWERS=1 cargo test --test suite recorded_answers`, and
-//! the difference of the text file says what moved.
+//! A change that is not meant to change results must pass this test. After a change that is meant
+//! to change them, record them again with
+//! `RECORD_ANSWERS=1 cargo test --test suite recorded_answers`. The difference of the text file
+//! shows the changed results.
 
 mod readings;
 mod scenes;
 
-/// Largest difference from a recorded number, relative to the largest number of its line: sums
-/// taken in another order differ by some thousand roundings of 1e-16; anything else moves a number
-/// by far more.
+/// Largest difference from a recorded number, relative to the largest number of its line. Sums in
+/// another order differ by some thousand roundings of 1e-16. Other causes change a number by far
+/// more.
 const TOLERANCE: f64 = 1e-12;
 
-/// The same for strains and what comes of them. Processors with wider instructions sum in another
-/// order, and λ, the least of a flat score, is known to the root of rounding: with AVX-512 and with
-/// AVX2 strains differ by up to 4e-10.
+/// The tolerance for strains and results that depend on them. Processors with wider SIMD registers
+/// sum in another order, and λ, the minimum of a flat score, is accurate to the square root of
+/// rounding: strains with AVX-512 and with AVX2 differ by up to 4e-10.
 const STRAIN_TOLERANCE: f64 = 1e-8;
 
-/// Answers under the name of a scene.
+/// Results, by the name of their scene.
 #[derive(Default)]
 struct Answers {
     scene: &'static str,
@@ -38,7 +39,7 @@ fn tolerance(name: &str, _recorded: f64, largest: f64) -> f64 {
     } else {
         TOLERANCE
     };
-    // Of two points and two constants nothing is left but the square of rounding.
+    // For two points and two constants, only the square of rounding remains.
     let floor = if name.ends_with("chi squared") {
         1e-20
     } else {

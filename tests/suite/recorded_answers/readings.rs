@@ -1,4 +1,4 @@
-//! What of a press is recorded: readings, moduli, surfaces, matches, strains.
+//! The recorded results of a press: readings, moduli, surfaces, matches and strains.
 use super::Answers;
 use nalgebra::{Matrix3, Point3};
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
@@ -38,7 +38,7 @@ pub(super) fn tensor(m: &Matrix3<f64>) -> impl Iterator<Item = f64> + '_ {
     (0..3).flat_map(move |row| (row..3).map(move |column| m[(row, column)]))
 }
 
-/// Contacts, surfaces, control points, matches, strains of all frames.
+/// Contacts, surfaces, control points, matches and strains of all frames.
 pub(super) fn press(answers: &mut Answers, name: &str, press: &mut Press<'_>) {
     for frame in 0..press.frames() {
         let name = format!("{name}frame {frame}");

@@ -1,4 +1,4 @@
-//! The scenes whose numbers are recorded.
+//! The scenes whose results are recorded.
 use super::Answers;
 use super::readings::{contact, estimates, modulus, press, tensor};
 use crate::common::press_of;
@@ -51,8 +51,7 @@ fn ball(answers: &mut Answers) {
     answers.add("flags", [everything.flags.len() as f64]);
 }
 
-/// A patterned block between plates: nothing is known of its shape, the modulus is stress over
-/// strain.
+/// A patterned block between plates: its shape is unknown, and the modulus is stress over strain.
 fn block(answers: &mut Answers) {
     answers.scene = "block";
     let scene = UniaxialScene::new(UniaxialOptions {
@@ -86,12 +85,13 @@ fn exactly(value: f64) -> Estimate {
     Estimate::new(value, 0.0)
 }
 
-/// A sensor that darkens with depth, forces from a gauge.
+/// A sensor that darkens with depth, with forces from a gauge.
 fn dark(answers: &mut Answers) {
     answers.scene = "dark";
     let table = [(0.0, 0.0), (50.0, 0.2e-3), (200.0, 1e-3)];
     let pixel_m = 0.1e-3;
-    // A ball of 4 mm; the grey is rounded, and noise that repeats keeps its levels from being flat.
+    // A ball of 4 mm. The grey values are rounded, and repeated noise prevents regions of constant
+    // level.
     let frame = |depth_m: f64| {
         Array2::from_shape_fn((90, 100), |(row, column)| {
             let (x, y) = (
@@ -142,7 +142,7 @@ fn stages_by_name(answers: &mut Answers) {
     answers.scene = "by name";
     let trial = trial(&[0.7, 1.2], 2);
     let default = StagesConfig {
-        // The law that the simulated contacts obey.
+        // The law of the simulated contacts.
         estimator: EstimatorChoice::Sphere,
         ..StagesConfig::default()
     };
@@ -252,7 +252,7 @@ fn stream(answers: &mut Answers) {
     }
 }
 
-/// A scene file with its images, measured as a user does.
+/// A scene file with its images, measured as by a user.
 fn scene_file(answers: &mut Answers) {
     answers.scene = "scene file";
     let options = PressOptions {
@@ -266,7 +266,7 @@ fn scene_file(answers: &mut Answers) {
     };
     let made = PressScene::new(options).expect("a scene");
     let folder = tempfile::tempdir().expect("a folder");
-    // A ball as small as the object would saturate.
+    // A ball as small as the object would saturate the camera.
     let calibration = made
         .unsaturated(CalibrationRun::default())
         .and_then(|options| made.calibrate(&options))

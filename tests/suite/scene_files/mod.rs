@@ -1,5 +1,5 @@
-//! Scene files from end to end: a simulated scene written to a folder is measured; every bad input
-//! gets its sentence.
+//! Scene files from end to end: a simulated scene is written to a folder and measured, and every
+//! invalid input gives its sentence.
 
 use ndarray::Array2;
 use std::fs;
@@ -14,7 +14,7 @@ use tactile_imaging::sfs::EquallySpaced;
 use tactile_imaging::tps::AffineModel;
 use tactile_simulate::{CalibrationRun, Camera, Elastic, PressOptions, PressScene, write_folder};
 
-/// The paper's error: ±5.38 % on both polymers.
+/// The error of the paper: ±5.38 % for both polymers.
 const PAPER_ERROR: f64 = 0.0538;
 
 #[test]
@@ -35,7 +35,7 @@ fn a_simulated_scene_on_disk_gives_the_polymers_moduli() {
         assert!(error.abs() < PAPER_ERROR, "error {error}");
         assert_eq!(modulus.estimator, EstimatorKind::HertzSphere);
         assert_eq!(measured.estimators[0].estimator, EstimatorKind::PaperRatio);
-        // a/R beyond 0.3 is flagged.
+        // a/R above 0.3 has a flag.
         let mut flags = measured.flags.iter().map(ToString::to_string);
         assert!(flags.any(|flag| flag.contains("a/R")));
     }
@@ -153,7 +153,7 @@ fn a_missing_scene_file_is_named() {
     assert!(error.contains("/no/such/scene.toml"), "{error}");
 }
 
-/// Everything measured of a scene, as text, but for the times.
+/// All results of a scene as text, except the times.
 fn measured(scene: &Scene, pipeline: &Pipeline) -> String {
     let data = scene.load().unwrap();
     let press = scene.press(pipeline, &data).unwrap();
@@ -173,7 +173,7 @@ fn stages_by_name_are_those_given_as_values() {
     let calibration = made.calibrate(&CalibrationRun::default()).unwrap();
     let path = write_folder(&made, &calibration, folder.path()).unwrap();
     let text = fs::read_to_string(&path).unwrap();
-    // Without the simulator's own choice of an estimator.
+    // Without the estimator chosen by the simulator.
     let text = text.replace("[stages]\nestimator = \"sphere\"\n", "");
     fs::write(&path, &text).unwrap();
     let scene_of =
@@ -257,10 +257,10 @@ fn a_gauge_alone_gives_force_contact_and_modulus() {
     fs::write(&path, VALID).unwrap();
     let calibrated = Scene::measure_file(&path).unwrap();
     let radius = |m: &Measurement| m.frames[0].as_ref().unwrap().contact_radius_m;
-    // The contact is that of the light.
+    // The contact is detected from the light.
     assert_eq!(radius(&measured), radius(&calibrated));
     assert!(measured.youngs_modulus_pa.is_ok());
-    // One frame without its force: a calibration is missing.
+    // One frame has no force: a calibration is missing.
     let half = gauged.replace("force_N = 1.1\nforce_error_N = 0.02", "");
     assert!(sentence(folder.path(), &half).contains("`calibration`: it is missing"));
 }
@@ -283,7 +283,7 @@ fn what_a_stage_cannot_do_withholds_nothing_of_the_others() {
     let folder = tempfile::tempdir().unwrap();
     small_scene(folder.path());
     let path = folder.path().join("scene.toml");
-    // A flat punch's law takes depths, which light does not give.
+    // The law of a flat punch needs depths, which light does not give.
     let text = VALID
         .replace("shape = \"sphere\"", "shape = \"flat_punch\"")
         .replace("[object]", "[stages]\nestimator = \"flat-punch\"\n[object]");
@@ -306,7 +306,7 @@ fn what_a_stage_cannot_do_withholds_nothing_of_the_others() {
     assert!(json["youngs_modulus_pa"]["error"].is_string());
     assert!(json["strain"]["mean"].is_array());
     assert!(json["frames"][0]["force_n"]["value"].is_number());
-    // An empty frame in the middle costs its own results alone.
+    // An empty frame in the middle affects only its own results.
     let text = VALID.replace("image = \"two.pgm\"", "image = \"reference.png\"");
     fs::write(&path, text).unwrap();
     let measured = Scene::measure_file(&path).unwrap();

@@ -14,8 +14,8 @@ use tactile_imaging::force::{ContactOptions, DriftCorrection, ForceOptions};
 use tactile_imaging::pipeline::{Assumptions, Object, Pipeline};
 use tactile_simulate::Camera;
 
-/// Changes of the illumination are divided out where they can be told, as a sensor's own pipeline
-/// does.
+/// Changes of the illumination are divided out if they can be determined, as in the pipeline of a
+/// calibrated sensor.
 fn drift_corrected() -> ForceOptions {
     let contact = ContactOptions::default().with_drift(DriftCorrection::Automatic);
     ForceOptions::default().with_contact(contact)
@@ -32,7 +32,7 @@ fn state_sample(errors: &mut Assumptions) {
     errors.state(Source::Adhesion, 0.0);
 }
 
-/// The pipeline of the study: the estimator is the linear law that the contacts were made by.
+/// The pipeline of the study: the estimator is the linear law that generated the contacts.
 fn pipeline(sensor: &Sensor) -> Pipeline {
     let guide = sensor.waveguide().unwrap();
     sensor
@@ -74,9 +74,9 @@ fn study(exponents: &[f64], camera: Camera, sensors: u64, presses: u32) -> Study
     study
 }
 
-/// The paper's camera with pixels twice as wide over the same 30 mm: small enough for a test, and
-/// blurred by so little that the local curve, which is not linear, reads the same pressure from the
-/// mean light of a pixel as from its parts.
+/// The paper's camera with pixels twice as wide over the same 30 mm: small enough for a test. The
+/// averaging over a pixel is so small that the nonlinear local curve gives the same pressure from
+/// the mean light of a pixel as from its parts.
 fn half() -> Camera {
     Camera::default().coarser(2)
 }
@@ -85,12 +85,12 @@ fn half() -> Camera {
 fn a_sensor_with_every_effect_is_calibrated() {
     let study = study(&[0.8, 1.2], half(), 2, 4);
     let [median, worst] = study.median_and_worst();
-    // The bounds of the full study; eight draws can hardly tell more.
+    // The bounds of the full study. Eight draws hardly allow tighter ones.
     assert!(median < 0.02 && worst < 0.06, "{:?}", study.errors);
     assert!(study.held() >= 0.5);
 }
 
-/// Every mistake ends in one sentence that names what is wrong, before anything is written.
+/// Every mistake gives one sentence that names it, before any file is written.
 #[test]
 fn mistakes_of_a_calibration_are_named() {
     let effects = Effects {
@@ -113,7 +113,8 @@ fn mistakes_of_a_calibration_are_named() {
         matches!(uncovered, SensorError::NotCovered { .. }),
         "{uncovered}"
     );
-    // All balls twice as large as stated: layers twice as soft, seven times their stated error.
+    // All balls are twice as large as stated: the layers are twice as soft, which is seven times
+    // their stated error.
     let balls = sentence(&|c| {
         for press in &mut c.presses {
             if let Indenter::Ball { radius_m, .. } = &mut press.indenter {
@@ -122,8 +123,8 @@ fn mistakes_of_a_calibration_are_named() {
         }
     });
     assert!(matches!(balls, SensorError::Radius { .. }), "{balls}");
-    // The largest force of the largest ball, whose pressures the other balls have too: the curve
-    // cannot bend to it.
+    // The largest force of the largest ball. The other balls reach its pressures too, so that the
+    // curve cannot adapt to it.
     let force = sentence(&|c| c.presses[37].force_n *= 1.3);
     assert!(
         matches!(force, SensorError::Scatter { worst: 37, .. }),
@@ -137,8 +138,8 @@ fn mistakes_of_a_calibration_are_named() {
     }
 }
 
-/// A sensor's file says the same when it is read again, and names what is wrong in one that cannot
-/// be used.
+/// A sensor file that is read gives the written sensor, and the error of an invalid file names the
+/// cause.
 #[test]
 fn a_sensor_file_is_read_as_it_was_written() {
     let calibrated = Simulated::new(Effects::ALL, Camera::default().coarser(4), 78)

@@ -1,7 +1,7 @@
-//! Simulated sensors with every effect that a calibration must learn, and presses on them.
+//! Simulated sensors with every effect that a calibration must determine, and presses on them.
 //!
-//! Contacts are those of the linear theory of bonded layers, radius by radius, with Hertz's
-//! pressure: the simulator's closed form takes the layers in series.
+//! Contacts are those of the linear theory of bonded layers for each radius, with Hertz's pressure.
+//! The closed form of the simulator uses layers in series.
 use ndarray::Array2;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::{Distribution, StandardNormal};
@@ -18,18 +18,18 @@ use tactile_simulate::{
     PressScene, Response,
 };
 
-/// What is not as the short form of a calibration takes it to be.
+/// Deviations from the assumptions of the short form of a calibration.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Effects {
-    /// Light goes as this power of the pressure.
+    /// The light is proportional to this power of the pressure.
     pub(super) exponent: f64,
     pub(super) vignetting: f64,
     pub(super) barrel: f64,
-    /// Pixels are so much higher than wide.
+    /// Height of pixels divided by their width.
     pub(super) aspect: f64,
-    /// Lamps change from frame to frame by up to this share.
+    /// Lamps change from frame to frame by up to this fraction.
     pub(super) lamps: f64,
-    /// Relative standard deviation of the layers' moduli about what the user states.
+    /// Relative standard deviation of the moduli of the layers about the stated values.
     pub(super) moduli: f64,
 }
 
@@ -52,20 +52,20 @@ impl Effects {
     };
 }
 
-/// Relative standard errors that are stated, and drawn from.
+/// Relative standard errors that are stated and used for the draws.
 const GAUGE_ERROR: f64 = 2e-3;
 const TARGET_ERROR: f64 = 5e-4;
 const THICKNESS_ERROR: f64 = 5e-3;
 const CALIBRATION_BALL_ERROR: f64 = 1e-3;
 pub(super) const BALL_ERROR: f64 = 3e-3;
-/// Standard error of the sample's Poisson ratio.
+/// Standard error of the Poisson's ratio of the sample.
 pub(super) const POISSON_ERROR: f64 = 2e-3;
 /// In newtons.
 const GAUGE_NOISE_N: f64 = 1e-3;
 
-/// Balls of the calibration and the most that each is pressed with.
+/// Balls of the calibration and the largest force of each.
 const BALLS: [(f64, f64); 3] = [(4e-3, 0.3), (10e-3, 0.5), (30e-3, 0.6)];
-/// Loads a ball, up and down again.
+/// Loads per ball, up and down again.
 const STEPS: usize = 8;
 const PITCH_M: f64 = 1.5e-3;
 
@@ -74,7 +74,7 @@ pub(super) const SAMPLE_PA: f64 = 62e3;
 pub(super) const SAMPLE_POISSON: f64 = 0.49;
 pub(super) const LOADS_N: [f64; 3] = [0.05, 0.12, 0.25];
 
-/// A sensor as it is, and as its user states it.
+/// A sensor with its true values and those stated by its user.
 pub(super) struct Simulated {
     effects: Effects,
     truth: Vec<Layer>,
@@ -82,7 +82,7 @@ pub(super) struct Simulated {
     gauge: f64,
     target: f64,
     balls: [f64; 3],
-    /// The gain of light is this scene's: its pressure is the largest.
+    /// The gain of the light is that of this scene, which has the largest pressure.
     scene: PressScene,
     rng: ChaCha8Rng,
 }
@@ -103,7 +103,7 @@ fn state(force_n: f64, a: f64, radius_m: f64) -> ContactState {
     }
 }
 
-/// The root of a falling function of ln x, by bisection.
+/// The root of a decreasing function of ln x, by bisection.
 fn root(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
     for _ in 0..40 {
         let middle = (low * high).sqrt();
@@ -132,7 +132,7 @@ fn rigid_states(layers: &[Layer], radius_m: f64, forces: &[f64]) -> Vec<ContactS
         .collect()
 }
 
-/// States of a soft ball on the layers: those at which the estimator finds the ball's modulus.
+/// States of a soft ball on the layers: those at which the estimator gives the modulus of the ball.
 fn soft_states(layers: &[Layer], radius_m: f64, poisson: f64, forces: &[f64]) -> Vec<ContactState> {
     let guide = Waveguide::new(layers.to_vec()).unwrap();
     let estimator = estimator(radius_m, poisson, &guide);
@@ -227,7 +227,7 @@ impl Simulated {
         load
     }
 
-    /// Anywhere that a contact of some 4 mm fits in.
+    /// A random position at which a contact of about 4 mm fits.
     fn place(&mut self) -> [f64; 2] {
         let camera = self.scene.options().camera;
         let size = [camera.shape[1] as f64, camera.shape[0] as f64];
@@ -281,7 +281,7 @@ impl Simulated {
             layers: self.stated.clone(),
             flat_field: true,
             gauge_error: GAUGE_ERROR,
-            // Sample and calibrator scatter alike.
+            // Sample and calibration object scatter alike.
             coupling_error: Some(0.0),
             gauge_noise_n: GAUGE_NOISE_N,
             shear: None,
@@ -289,7 +289,7 @@ impl Simulated {
         }
     }
 
-    /// Frames of a soft ball of the stated radius, give or take what is stated of it.
+    /// Frames of a soft ball with the stated radius and a random error of the stated size.
     pub(super) fn press(&mut self, repeat: u32) -> Vec<Array2<u8>> {
         let radius_m = SAMPLE_RADIUS_M * (1.0 + BALL_ERROR * normal(&mut self.rng));
         let poisson = (SAMPLE_POISSON + POISSON_ERROR * normal(&mut self.rng)).min(0.5);
@@ -316,7 +316,7 @@ fn rigid(radius_m: f64) -> ElasticSphere {
 }
 
 /// The same scene with its contact centred elsewhere, in pixels: its light does not depend on the
-/// place.
+/// position.
 fn centred(scene: &PressScene, place: [f64; 2]) -> PressScene {
     PressScene::new(PressOptions {
         centre_px: Some(place),

@@ -1,5 +1,5 @@
-//! Each effect alone on a sensor that was not calibrated for it: the answer moves by less than its
-//! interval, or it is flagged.
+//! Each effect alone, on a sensor that was not calibrated for it: the result changes by less than
+//! its interval, or it has a flag.
 #![allow(clippy::print_stdout)]
 use super::SAMPLE;
 use super::sensors::{Effects, SAMPLE_POISSON, SAMPLE_RADIUS_M, Simulated, estimator};
@@ -11,21 +11,21 @@ use tactile_imaging::force::{CalibrationPair, ForceOptions};
 use tactile_imaging::pipeline::{Flag, LightContact, Pipeline};
 use tactile_simulate::Camera;
 
-/// What is left out of the calibration.
+/// The omitted part of the calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum LeftOut {
     /// A line from frame sums to force instead of the local curve.
     Curve,
     FlatField,
-    /// Square pixels of the size that the camera's columns have, and no distortion.
+    /// Square pixels with the width of the camera's columns, and no distortion.
     Target,
     /// Changes of the lamps are not divided out.
     Drift,
-    /// The layers stay as their maker states them.
+    /// The layers keep the values stated by their manufacturer.
     Layers,
 }
 
-/// What an effect is called, what it does, and what is left out of the calibration.
+/// The name of an effect, the effect, and the omitted part of the calibration.
 type Case = (&'static str, fn(&mut Effects), LeftOut);
 
 const CASES: [Case; 7] = [
@@ -42,10 +42,10 @@ const CASES: [Case; 7] = [
     ("layers 10 % wrong", |e| e.moduli = 0.1, LeftOut::Layers),
 ];
 
-/// A modulus with its cautions, or the sentence by which the calibration refused.
+/// A modulus with its cautions, or the sentence of a refused calibration.
 type Answer = Result<(ModulusEstimate, Vec<Flag>), SensorError>;
 
-/// Sums of the frames of the largest ball, as a line is fitted to.
+/// Sums of the frames of the largest ball, for the fit of a line.
 fn pairs(calibration: &SensorCalibration) -> Vec<CalibrationPair> {
     let mut pairs = vec![CalibrationPair::loading(0.0, 0.0)];
     let reference = calibration.references[0].mapv(f64::from);
@@ -86,7 +86,7 @@ fn pipeline(calibration: &SensorCalibration, sensor: &Sensor, left_out: LeftOut)
         .with_estimator(estimator(SAMPLE_RADIUS_M, SAMPLE_POISSON, &guide))
 }
 
-/// The modulus on a simulated sensor, with part of the calibration left out.
+/// The modulus on a simulated sensor, with part of the calibration omitted.
 fn answer(effects: Effects, left_out: Option<LeftOut>, seed: u64) -> Answer {
     let camera = Camera::default().coarser(4);
     let mut simulated = Simulated::new(effects, camera, seed);
@@ -127,7 +127,7 @@ fn answer(effects: Effects, left_out: Option<LeftOut>, seed: u64) -> Answer {
     Ok((modulus, flags))
 }
 
-/// Prints a row an effect, and returns the effects that were neither within the interval nor
+/// Prints one row per effect. Returns the effects that were neither within the interval nor
 /// flagged.
 fn table(seeds: u64) -> Vec<(&'static str, u32)> {
     // The same draws without an effect.

@@ -1,4 +1,4 @@
-//! The scene simulator against itself: its truth is consistent.
+//! The consistency of the scene simulator.
 mod noise;
 mod recorded;
 mod series;
@@ -12,7 +12,7 @@ use tactile_simulate::{
     PressScene, Response, SimulateError,
 };
 
-/// The default scene with so many times as wide pixels.
+/// The default scene with pixels wider by this factor.
 fn coarser(factor: usize) -> PressOptions {
     PressOptions {
         camera: Camera::default().coarser(factor),
@@ -24,7 +24,7 @@ fn small() -> PressOptions {
     coarser(4)
 }
 
-/// The same without noise, blur and vignetting.
+/// The default scene without noise, blur and vignetting.
 fn ideal() -> PressOptions {
     let mut options = small();
     options.camera = options.camera.ideal();
@@ -66,15 +66,15 @@ fn the_light_of_an_ideal_frame_integrates_as_hertz_says() {
             // ∫ (1 − r²/a²)^{n/2} dS = πa²/(1 + n/2).
             let disc = |n: f64| PI * a * a / (1.0 + 0.5 * n);
             let seen = match response {
-                // The response bends relative to the largest load's peak.
+                // The curvature of the response is relative to the peak of the largest load.
                 Response::Quadratic { droop } => force - droop / largest * p0 * p0 * disc(2.0),
                 Response::Power { exponent } => {
                     largest * (p0 / largest).powf(exponent) * disc(exponent)
                 }
                 _ => force,
             };
-            // 10⁵ pixels of up to 215 grey levels, each rounded to 1 ulp (3e-14), against a sum of
-            // 10⁶: below 1e-13.
+            // 10⁵ pixels of up to 215 grey levels, each rounded to 1 ulp (3e-14), relative to a sum
+            // of 10⁶: below 1e-13.
             let expected = seen * truth.grey_per_pascal / area;
             assert!(
                 relative(light(&scene, k), expected) < tolerance,
@@ -85,13 +85,14 @@ fn the_light_of_an_ideal_frame_integrates_as_hertz_says() {
             assert!(relative(truth.pressure_pa().sum() * area, force) < 1e-12);
             for axis in 0..2 {
                 let error = truth.centroid_px[axis] - [170.37, 131.8][axis];
-                // Rim pixels are weighed at their centres, which shifts the centroid by some 1e-5
-                // px.
+                // Rim pixels are evaluated at their centres, which shifts the centroid by about
+                // 1e-5 px.
                 assert!(error.abs() < 1e-4, "{error}");
             }
         }
         let brightest = scene.expected_frame(1).iter().copied().fold(0.0, f64::max);
-        // The largest load's peak is where the gain put it, less the curvature within one pixel.
+        // The gain determines the peak of the largest load, apart from the curvature within one
+        // pixel.
         assert!((brightest - 215.0).abs() < 0.1, "{brightest}");
     }
 }
@@ -114,7 +115,7 @@ fn blur_keeps_force_and_centroid_and_reaches_in_from_beyond_the_edge() {
         (x - 171.3).abs() < 1e-4,
         "rim pixels shift the centroid by some 1e-5 px"
     );
-    // A contact whose rim lies just left of the frame still lightens the first column.
+    // A contact whose rim is just left of the frame still brightens the first column.
     let radius_px = blurred.truth(0).contact.contact_radius_m / options.camera.pixel_size_m[0];
     options.centre_px = Some([-radius_px - 1.5, 120.4]);
     let beyond = PressScene::new(options).unwrap();
@@ -128,7 +129,7 @@ fn the_apparent_surface_scales_with_the_cube_root_of_the_force() {
     let map = truth[0].scaling_to(&truth[1]);
     assert!(relative(map.scale, (1.2_f64 / 0.7).cbrt()) < 1e-14);
     let (height0, height1) = (truth[0].apparent_height_m(), truth[1].apparent_height_m());
-    // The middle of the frame is the centre, half a pixel from the nearest pixel's.
+    // The middle of the frame is the centre, half a pixel from the nearest pixel centre.
     assert!(relative(height1[[130, 174]] / height0[[130, 174]], map.scale) < 1e-3);
     let strain = map.green_lagrange_strain()[(2, 2)];
     assert!(relative(strain, 0.5 * ((1.2_f64 / 0.7).powf(2.0 / 3.0) - 1.0)) < 1e-13);
@@ -141,7 +142,7 @@ fn a_brighter_gain_saturates_and_no_force_is_no_light() {
     let scene = PressScene::new(options).unwrap();
     let truth = scene.truth(1);
     assert!(truth.saturated_pixels > 1000);
-    // Rounding puts light from 254.5 on at 255 as well.
+    // Light of 254.5 and more is also rounded to 255.
     let bright = scene.frame(1, 0).iter().filter(|&&v| v == 255).count();
     assert!(bright >= truth.saturated_pixels && bright < truth.saturated_pixels + 100);
     let loads = vec![PressLoad::normal(0.0)];
@@ -153,8 +154,8 @@ fn a_brighter_gain_saturates_and_no_force_is_no_light() {
     assert!(made.truth[0].centroid_px[0].is_nan());
 }
 
-/// A gain that suits a large soft ball's low pressure is too high for a small rigid one: its sums
-/// are no longer in proportion to the force.
+/// A gain that suits the low pressure of a large soft ball is too high for a small rigid ball: its
+/// sums are not proportional to the force.
 #[test]
 fn a_calibration_that_saturates_is_refused_and_says_what_helps() {
     let object = ElasticSphere {
@@ -251,8 +252,9 @@ fn every_meaningless_value_is_named() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 
-    /// Any scene, however odd its frame, makes frames of the right size whose visible force lies
-    /// between zero and the force and, where nothing is clipped, whose light is that force.
+    /// Every scene, however unusual its frame, gives frames of the right size. The visible force
+    /// lies between zero and the force, and the light is that of the visible force unless it is
+    /// clipped.
     #[test]
     fn any_scene_keeps_its_books(
         shape in (1_usize..60, 1_usize..60),
@@ -285,7 +287,7 @@ proptest! {
         let truth = &made.truth[0];
         prop_assert!(truth.visible_force_n >= 0.0 && truth.visible_force_n <= force * (1.0 + 1e-9));
         let carried = light(&scene, 0) * camera.pixel_size_m.iter().product::<f64>();
-        // Blur moves light over the edge, but makes none.
+        // Blur moves light across the edge, but does not create any.
         let most = force * truth.grey_per_pascal;
         prop_assert!(carried >= -1e-9 * most.max(1e-12) && carried <= most * (1.0 + 1e-9) + 1e-12);
         if blur_sigma_px == 0.0 {

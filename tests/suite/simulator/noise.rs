@@ -1,4 +1,4 @@
-//! The camera's noise has the moments it states, and is the same for the same seed.
+//! The noise of the camera has the stated moments, and equal seeds give equal noise.
 use super::{relative, small};
 use ndarray::Array2;
 use tactile_simulate::{Camera, PressOptions, PressScene};
@@ -11,14 +11,14 @@ fn noise_has_the_stated_mean_and_variance() {
         shape: SHAPE,
         ..Camera::default()
     };
-    // Rounding adds 1/12 where the noise spans a level or more, as it does in these fields.
+    // Rounding adds 1/12 if the noise is at least one level, as in these fields.
     for grey in [4.0, 15.0, 120.0, 200.0] {
         let image = camera.expose(Array2::from_elem(SHAPE, grey).view(), 7, 3);
         let image = image.mapv(f64::from);
         let (n, mean, variance) = (image.len() as f64, image.mean().unwrap(), image.var(1.0));
         let photons = grey * 255.0 / camera.full_well_electrons;
         let expected = photons + camera.read_noise_grey.powi(2) + 1.0 / 12.0;
-        // Five standard errors: a false alarm in 10⁶.
+        // Five standard errors: a probability of 10⁻⁶ of a false alarm.
         let off = 5.0 * (expected / n).sqrt() + 0.02;
         assert!((mean - grey).abs() < off, "mean {mean} of {grey}");
         let off = 5.0 * (2.0 / n).sqrt() + 0.02;
@@ -31,8 +31,8 @@ fn noise_has_the_stated_mean_and_variance() {
 
 #[test]
 fn faint_light_is_poisson() {
-    // 20 electrons a grey level and no read noise: at 2 grey levels the count is Poisson of mean
-    // 40.
+    // 20 electrons per grey level and no read noise: at 2 grey levels the count has a Poisson
+    // distribution of mean 40.
     let camera = Camera {
         shape: SHAPE,
         full_well_electrons: 5100.0,
@@ -42,8 +42,8 @@ fn faint_light_is_poisson() {
     let image = camera.expose(Array2::from_elem(SHAPE, 2.0).view(), 1, 1);
     let n = image.len() as f64;
     let share = |most: u8| image.iter().filter(|&&v| v <= most).count() as f64 / n;
-    // Grey 0 is fewer than 10 electrons: P(X ≤ 9 | 40) = 9.2e-9; grey ≤ 1 is fewer than 30: 0.0374…
-    // by summation.
+    // Grey 0 means fewer than 10 electrons: P(X ≤ 9 | 40) = 9.2e-9. Grey ≤ 1 means fewer than 30:
+    // 0.0374…, by summation.
     let (mut term, mut expected) = ((-40.0_f64).exp(), 0.0);
     for i in 1..=30 {
         expected += term;

@@ -1,9 +1,9 @@
-//! The simulator's frames to the bit: a change of its code that is meant to change no frame is held
-//! to the frames recorded here.
+//! The frames of the simulator, bit for bit: a change of its code that is not meant to change
+//! frames must reproduce the frames recorded here.
 //!
-//! The frames are integers, so a last digit of a system's `exp` or `sin` almost never shows. A
-//! change that is meant to change frames records the new checksums (each failing line prints them)
-//! and says so in its commit.
+//! The frames are integers, so that the last digit of a platform's `exp` or `sin` almost never
+//! matters. For a change that is meant to change frames, record the new checksums (each failing
+//! line prints them) and mention it in the commit.
 use ndarray::Array2;
 use tactile_simulate::{
     CalibrationRun, Camera, ContactModel, Gain, Illumination, LoadCycle, PressLoad, PressOptions,

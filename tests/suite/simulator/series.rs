@@ -16,7 +16,7 @@ fn the_calibration_is_linear_and_holds_for_the_object_as_well() {
     assert_eq!((series.pairs.len(), series.true_forces_n.len()), (41, 41));
     assert_eq!(series.true_forces_n[20], 2.0);
     assert_eq!(series.pairs[21].branch, Branch::Unloading);
-    // 90 828 pixels of about 0.8 grey levels of noise, twice; five standard errors.
+    // 90 828 pixels with a noise of about 0.8 grey levels, twice; five standard errors.
     let noise = 5.0 * (2.0 * 90828.0_f64).sqrt() * 1.2 * series.newton_per_grey;
     for (pair, force_n) in series.pairs.iter().zip(&series.true_forces_n) {
         let found = pair.integrated_pixel_value * series.newton_per_grey;
@@ -65,7 +65,7 @@ fn a_stream_rests_rises_and_falls_at_the_frame_rate() {
     assert_eq!(frames.len(), 168);
     let force = |frame: usize| frames[frame].truth.contact.force_n;
     assert!((0..8).all(|k| force(k) == 0.0));
-    // Frames fall on the middle of the cycles: rest 8 frames, period 80.
+    // Frames coincide with the middle of the cycles: rest 8 frames, period 80.
     assert!(relative(force(48), 1.2) < 1e-12 && relative(force(128), 1.2) < 1e-12);
     assert!(force(88).abs() < 1e-12);
     assert!(relative(frames[16].truth.load.illumination.level, 1.1) < 1e-12);

@@ -1,4 +1,4 @@
-//! Contacts given as tables over the radius.
+//! Contacts given as tables of the radius.
 use super::{relative, small};
 use tactile_simulate::{
     ContactModel, ContactState, LoadCycle, PressLoad, PressOptions, PressScene, SimulateError,
@@ -40,7 +40,8 @@ fn a_table_of_hertz_is_seen_as_hertz() {
         let peak = expected.contact.peak_pressure_pa;
         let difference = (expected.pressure_pa() - found.pressure_pa())
             .fold(0.0, |worst: f64, v| worst.max(v.abs()));
-        // At the rim 16 midpoints a side stand for the pixel; inside only rounding is left.
+        // At the rim the pixel is represented by 16 midpoints per side. Inside, only rounding
+        // remains.
         assert!(difference < 1e-3 * peak, "{difference} of {peak} Pa");
         assert!(relative(found.visible_force_n, expected.visible_force_n) < 2e-5);
         assert!(relative(found.pressure_pa().sum() * area, expected.contact.force_n) < 2e-5);
@@ -48,7 +49,7 @@ fn a_table_of_hertz_is_seen_as_hertz() {
         assert!(relative(seen, wanted) < 2e-5);
         let (seen, wanted) = (table.frame(load, 0), exact.frame(load, 0));
         let other = seen.iter().zip(&wanted).filter(|(a, b)| a != b).count();
-        // The same noise falls on the same light: a difference of 1e-4 grey levels moves the
+        // The same noise is added to the same light: a difference of 1e-4 grey levels changes the
         // rounding of one pixel in 10⁴.
         assert!(other < 20, "{other} of {} pixels", seen.len());
         let a = found.contact.contact_radius_m;
@@ -67,7 +68,7 @@ fn a_tabulated_contact_refuses_loads_beyond_its_last_state() {
             ..small()
         })
     };
-    // A solver's state carries the force it was asked for but for its tolerance.
+    // The force of a solver's state is the requested force within its tolerance.
     assert!(with(0.7 * (1.0 + 1e-10)).is_ok() && with(0.0).is_ok());
     let reaches = |maximum: f64| (maximum / 0.7 - 1.0).abs() < 1e-8;
     assert!(matches!(
@@ -79,7 +80,7 @@ fn a_tabulated_contact_refuses_loads_beyond_its_last_state() {
     assert!(scene.stream(cycle).is_err(), "1.2 N in the cycle");
     cycle.largest_force_n = 0.7;
     assert_eq!(scene.stream(cycle).unwrap().count(), 88);
-    // Below the only state the contact shrinks as Hertz's does.
+    // Below the only state the contact decreases like Hertz's.
     let radius = |scene: &PressScene| scene.truth(0).contact.contact_radius_m;
     let shrunk = radius(&with(0.1).unwrap()) / radius(&scene);
     assert!(relative(shrunk, (0.1_f64 / 0.7).cbrt()) < 1e-12);

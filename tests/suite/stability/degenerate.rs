@@ -1,12 +1,12 @@
-//! Frames that are hardly frames.
+//! Degenerate frames.
 use crate::sound;
 use ndarray::Array2;
 use tactile_imaging::Pipeline;
 use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::{EstimatorChoice, Object, StagesConfig};
 
-/// Hertz's hemisphere of this radius in pixels and peak in grey levels, in the middle of a frame
-/// over a background of 15.
+/// Hertz's hemisphere with this radius in pixels and peak in grey levels, in the middle of a frame
+/// with a background of 15.
 fn dome((rows, columns): (usize, usize), radius: f64, peak: f64) -> Array2<u8> {
     let middle = [(rows as f64 - 1.0) / 2.0, (columns as f64 - 1.0) / 2.0];
     Array2::from_shape_fn((rows, columns), |(r, c)| {

@@ -1,4 +1,4 @@
-//! One load, many equal ones, loads in falling order, as many as a session keeps.
+//! One load, many equal loads, decreasing loads, and as many loads as a session keeps.
 use super::press::{SI, coarse_camera, pipeline, relative, trial};
 use super::table::{EXACT, Table};
 use tactile_imaging::Pipeline;
@@ -7,13 +7,13 @@ use tactile_imaging::elasticity::modulus::ModulusEstimate;
 use tactile_imaging::pipeline::{EstimatorChoice, PipelineError, Session, StagesConfig};
 use tactile_simulate::Trial;
 
-/// Rising by 35 mN from 0.2 N: the last within the calibration.
+/// Increases of 35 mN from 0.2 N: the last load is within the calibration.
 fn steps(loads: usize) -> Vec<f64> {
     (0..loads).map(|k| 0.2 + 0.035 * k as f64).collect()
 }
 
-/// Six of its standard errors around the truth; those errors between a thousandth (that of the
-/// force scale) and the two hundredths that the worst load alone has.
+/// The deviation from the true value is at most six standard errors. These lie between a thousandth
+/// (the error of the force scale) and two hundredths (the error of the worst load alone).
 pub(crate) fn many(table: &mut Table) {
     let falling = steps(8).into_iter().rev().collect();
     for (what, forces) in [
@@ -29,8 +29,8 @@ pub(crate) fn many(table: &mut Table) {
         let press = trial.press(&pipeline).unwrap().modulus().unwrap();
         let session = streamed(&trial, &pipeline);
         let gap = (session.youngs_modulus_pa / press.youngs_modulus_pa - 1.0).abs();
-        // A session has its loads in rising order; those that it merges are 3 % apart and follow
-        // one law, of which they are means.
+        // A session keeps its loads in increasing order. The loads that it merges are 3 % apart and
+        // follow one law, of which they are means.
         let allowed = if forces.len() > Session::MOST_LOADS {
             0.1 * press.standard_error_pa / truth
         } else {
@@ -74,7 +74,7 @@ fn the_order_of_loads_is_no_matter() {
     }
 }
 
-/// Estimators that look at strain say how many loads they need.
+/// Estimators that use strain report how many loads they need.
 #[test]
 fn one_load_has_no_strain() {
     for (choice, needed) in [
@@ -90,7 +90,7 @@ fn one_load_has_no_strain() {
     }
 }
 
-/// Stress over strain where both are noise: the loads determine no modulus, or zero within six
+/// Stress over strain if both are noise: the loads determine no modulus, or zero within six
 /// standard errors.
 #[test]
 fn equal_loads_have_no_ratio() {

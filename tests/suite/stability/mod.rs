@@ -1,5 +1,5 @@
-//! The whole pipeline in every unit, position and brightness, and at the ends of what frames and
-//! loads can be.
+//! The whole pipeline in different units, positions and brightness, and for extreme frames and
+//! loads.
 mod degenerate;
 mod loads;
 mod press;

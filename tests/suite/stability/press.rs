@@ -1,4 +1,4 @@
-//! A simulated press, its sensor in any unit, and what the pipeline says of it.
+//! A simulated press, its sensor in any unit, and the results of the pipeline.
 use nalgebra::Matrix3;
 use ndarray::Array2;
 use std::sync::Arc;
@@ -11,8 +11,8 @@ use tactile_imaging::force::{
 use tactile_imaging::pipeline::{EstimatorChoice, LightContact, Object, StagesConfig};
 use tactile_simulate::{CalibrationRun, Camera, Gain, PressLoad, PressOptions, Trial};
 
-/// 348 × 260 pixels on 15 mm: the contact is as large in pixels as a camera of 696 × 520 sees it,
-/// for 200 control points enough.
+/// 348 × 260 pixels on 15 mm: the contact has as many pixels as with a camera of 696 × 520, enough
+/// for 200 control points.
 pub(crate) fn camera() -> Camera {
     Camera {
         shape: [260, 348],
@@ -26,7 +26,8 @@ pub(crate) fn coarse_camera() -> Camera {
     Camera::default().coarser(8)
 }
 
-/// A press at these forces seen by a camera, its brightest pixel at this grey above the background.
+/// A press at these forces seen by a camera whose brightest pixel is this grey value above the
+/// background.
 pub(crate) fn trial(camera: Camera, peak_grey: f64, forces: &[f64]) -> Trial {
     let options = PressOptions {
         camera,
@@ -35,7 +36,7 @@ pub(crate) fn trial(camera: Camera, peak_grey: f64, forces: &[f64]) -> Trial {
         seed: 3,
         ..PressOptions::default()
     };
-    // The calibration's contact, too, lies wholly within the finer camera's view.
+    // The contact of the calibration also lies completely within the view of the finer camera.
     let calibration = CalibrationRun {
         largest_force_n: 1.5,
         ..CalibrationRun::default()
@@ -43,7 +44,7 @@ pub(crate) fn trial(camera: Camera, peak_grey: f64, forces: &[f64]) -> Trial {
     Trial::new(options, &calibration).expect("a scene")
 }
 
-/// Units of length and force in which the sensor is described, and the grey levels of its
+/// Units of length and force of the description of the sensor, and the grey levels of its
 /// calibration.
 #[derive(Clone, Copy)]
 pub(crate) struct Units {
@@ -58,8 +59,8 @@ pub(crate) const SI: Units = Units {
     grey: 1.0,
 };
 
-/// The trial's pipeline with its sensor described in other units: the layers' moduli too, in force
-/// over length².
+/// The pipeline of the trial with its sensor described in other units, including the moduli of the
+/// layers in force per length².
 pub(crate) fn pipeline(trial: &Trial, units: Units) -> Pipeline {
     let options = trial.scene.options();
     let layers = options.waveguide.layers.iter().map(|l| Layer {
@@ -81,8 +82,8 @@ pub(crate) fn pipeline(trial: &Trial, units: Units) -> Pipeline {
         poisson_ratio: ball.material.poisson_ratio,
     };
     let waveguide = Waveguide::new(layers.collect()).expect("layers");
-    // The drift of the light is read from tiles of the frame, of which a frame that is moved or
-    // turned has others: what is compared is all that comes after.
+    // The drift of the light is determined from tiles of the frame, and a shifted or rotated frame
+    // has different tiles: the comparison covers the stages after it.
     let contact = ContactOptions::default().with_drift(DriftCorrection::None);
     let options = ForceOptions::default().with_contact(contact);
     let line = LinearCalibration::fit(&pairs, &Default::default()).expect("a calibration");
@@ -95,14 +96,14 @@ pub(crate) fn pipeline(trial: &Trial, units: Units) -> Pipeline {
         })
         .unwrap()
         .with_stages(&StagesConfig {
-            // The law that the simulated contacts obey.
+            // The law of the simulated contacts.
             estimator: EstimatorChoice::Sphere,
             ..StagesConfig::default()
         })
         .expect("stages")
 }
 
-/// Exposures without contact, from which the noise of all pixels is measured, and the frames of a
+/// Exposures without contact, for the measurement of the noise of all pixels, and the frames of a
 /// press.
 #[derive(Clone)]
 pub(crate) struct Images {
@@ -128,16 +129,16 @@ impl Images {
     }
 }
 
-/// What the pipeline says of a press.
+/// The results of the pipeline for a press.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Answer {
-    /// Of each frame.
+    /// Force in each frame.
     pub(crate) force_n: Vec<f64>,
     pub(crate) radius_m: Vec<f64>,
     pub(crate) centroid_px: Vec<[f64; 2]>,
-    /// And its standard error.
+    /// Modulus and its standard error.
     pub(crate) modulus_pa: [f64; 2],
-    /// From the first frame to the last, with its standard error.
+    /// Strain from the first frame to the last, with its standard error.
     pub(crate) strain: Matrix3<f64>,
     pub(crate) strain_error: Matrix3<f64>,
 }
@@ -168,7 +169,7 @@ pub(crate) fn answer(pipeline: &Pipeline, images: &Images) -> Answer {
     }
 }
 
-/// The greatest relative difference of numbers that `scale` turns into those expected.
+/// The largest relative difference between the scaled numbers and the expected ones.
 pub(crate) fn relative(found: &[f64], expected: &[f64], scale: f64) -> f64 {
     let gap = |(f, e): (&f64, &f64)| (f / scale / e - 1.0).abs();
     let worst = |worst: f64, gap: f64| if worst >= gap { worst } else { gap };

@@ -1,5 +1,5 @@
-//! Units, brightness and position: what the numbers are against the truth, and what must not change
-//! them.
+//! Units, brightness and position: the results compared with the true values, and changes that must
+//! not affect them.
 use super::press::{
     Answer, Images, SI, Units, answer, camera, coarse_camera, pipeline, relative, trial,
 };
@@ -23,8 +23,9 @@ fn the_pipeline_keeps_its_numbers() {
     table.finish();
 }
 
-/// Frames of a camera without noise, blur and vignetting: what is left is the pixels' size, the
-/// rounding to whole grey levels and the gauge's noise in the calibration (2 mN, of 20 readings).
+/// Frames of a camera without noise, blur and vignetting. The remaining errors are the pixel size,
+/// rounding to integer grey levels, and the noise of the gauge in the calibration (2 mN, 20
+/// readings).
 fn truth(table: &mut Table) {
     for grey in [60.0, 120.0, 200.0, 235.0] {
         let (fine, coarse) = (camera().ideal(), coarse_camera().ideal());
@@ -39,9 +40,9 @@ fn truth(table: &mut Table) {
             let mut enter = |quantity: &str, found: &[f64], truth: &[f64], allowed| {
                 table.enter(&case(quantity), relative(found, truth, 1.0), allowed);
             };
-            // The gauge's mean is good for 0.1 % of these forces, and of 60 grey levels half of one
-            // is lost at the rim of few pixels: 0.2 %. E goes as F/a³, and as the layers yield too
-            // its error is 1.7 times theirs.
+            // The mean of the gauge is accurate to 0.1 % of these forces. Of 60 grey levels half of
+            // one is lost at the rim of few pixels: 0.2 %. E is proportional to F/a³, and because
+            // the layers are compliant too, its error is 1.7 times theirs.
             enter("force", &found.force_n, &force, 0.004);
             enter("radius", &found.radius_m, &radius, 1e-3);
             enter("modulus", &found.modulus_pa[..1], &[modulus_pa], 0.01);
@@ -57,8 +58,8 @@ fn truth(table: &mut Table) {
     }
 }
 
-/// At the rim, where a hemisphere is steepest, a quarter of a pixel may be taken or left: with
-/// pixels of width h that is √(h/2a) of its height.
+/// At the rim, where a hemisphere is steepest, a quarter of a pixel may be included or not: with
+/// pixels of width h this is √(h/2a) of its height.
 fn surface(table: &mut Table, case: &str, trial: &Trial) {
     let pipeline = pipeline(trial, SI);
     let press = trial.press(&pipeline).unwrap();
@@ -89,7 +90,7 @@ fn units(table: &mut Table, trial: &Trial, expected: &Answer) {
     }
 }
 
-/// Lengths, forces and moduli follow their units, strains have none.
+/// Lengths, forces and moduli follow their units. Strains have no unit.
 fn scaled(
     table: &mut Table,
     case: &str,
@@ -115,7 +116,8 @@ fn scaled(
     );
 }
 
-/// As much grey everywhere, in reference and frames: the differences, and so all bits, stay.
+/// The same grey value is added to reference and frames: the differences, and therefore all bits,
+/// do not change.
 fn pedestal(trial: &Trial, expected: &Answer) {
     // A grey level of 255 would count as saturated.
     let room = 254 - trial.simulation.frames.iter().flatten().max().unwrap();
@@ -126,11 +128,11 @@ fn pedestal(trial: &Trial, expected: &Answer) {
     }
 }
 
-/// Twice the light, twice the calibration's sums. How noise grows with light is read in whole grey
-/// levels, which do not double where the mean of two exposures has halves: the profile's fit weighs
-/// bright pixels otherwise, by a hundredth at most. What it finds moves by such shares of its own
-/// errors, 10⁻⁴ of the radius and 4 · 10⁻³ of the modulus; a tenth and a fortieth are allowed. The
-/// force is a sum and has no weights.
+/// Twice the light and twice the sums of the calibration. The dependence of noise on light is
+/// determined in integer grey levels, which do not double if the mean of two exposures contains
+/// halves. This changes the weights of bright pixels in the fit of the profile by at most a
+/// hundredth. Its results change by small fractions of their own errors, 10⁻⁴ for the radius and 4
+/// · 10⁻³ for the modulus; a tenth and a fortieth are allowed. The force is a sum without weights.
 fn light(table: &mut Table) {
     let trial = trial(camera(), 100.0, &[0.7, 1.2]);
     let expected = answer(&pipeline(&trial, SI), &Images::of(&trial));

@@ -1,11 +1,11 @@
-//! Steps of load that are hardly one: the strain goes with them to zero.
+//! Very small load steps: the strain tends to zero with them.
 use super::press::{Images, SI, answer, camera, pipeline, trial};
 use super::table::{STRAIN, Table};
 use ndarray::Array2;
 
-/// Without noise a share p of the pixels has another grey value; as many points stand otherwise,
-/// and independent errors of a share p add as √p. Frames without any such pixel are the same frame
-/// and have no strain at all, which is what the step left: δ/3.
+/// Without noise a fraction p of the pixels has a different grey value. The same fraction of points
+/// has a different position, and independent errors of a fraction p add up as √p. Frames without
+/// any such pixel are equal and have no strain at all, although the step is δ/3.
 pub(crate) fn small(table: &mut Table) {
     let steps = [0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2];
     for (what, camera) in [("without noise", camera().ideal()), ("noise", camera())] {
@@ -20,7 +20,7 @@ pub(crate) fn small(table: &mut Table) {
             let truth = 0.5 * ((2.0 / 3.0) * step.ln_1p()).exp_m1();
             for (k, name) in ["xx", "yy", "zz"].into_iter().enumerate() {
                 let case = format!("step {step:.0e}, {what}: strain e_{name}");
-                // The same to a rounding of one.
+                // Equal within a rounding of one.
                 let tolerance = STRAIN[k] * share + truth + 4.0 * f64::EPSILON;
                 table.enter(&case, (found.strain[(k, k)] - truth).abs(), tolerance);
             }
@@ -31,7 +31,7 @@ pub(crate) fn small(table: &mut Table) {
     }
 }
 
-/// Of the pixels of the first frame's contact, those that are otherwise in the second.
+/// Fraction of the pixels of the first frame's contact that differ in the second frame.
 fn changed_share(frames: &[Array2<u8>]) -> f64 {
     let both = frames[0].iter().zip(&frames[1]);
     let changed = both.filter(|(a, b)| a != b).count();

@@ -1,18 +1,17 @@
-//! The contact elsewhere in the frame, mirrored and turned.
+//! The contact at other positions in the frame, mirrored and rotated.
 use super::press::{Answer, Images, SI, answer, pipeline, relative};
 use super::table::{EXACT, STRAIN, Table};
 use nalgebra::Matrix3;
 use ndarray::{Array2, Axis};
 use tactile_simulate::Trial;
 
-/// The contact's threshold allows for false alarms among the pixels of the tiles around it, and
-/// those are others: a few faint pixels of the rim come and go, some 10⁻⁶ of the light. In this
-/// order for force, radius (of a fit that hardly looks at the rim) and centroid in pixels (10⁻⁵ of
-/// the light, a hundred pixels away at most).
+/// The threshold of the contact allows for false alarms among the pixels of the surrounding tiles,
+/// and these tiles differ: a few faint pixels of the rim are included or not, about 10⁻⁶ of the
+/// light. The tolerances are for force, radius (of a fit that hardly depends on the rim) and
+/// centroid in pixels (10⁻⁵ of the light, at a distance of at most a hundred pixels).
 const RIM: [f64; 3] = [1e-5, 1e-6, 1e-3];
 
-/// The image moved by whole pixels; what leaves on one side comes in on the other, so that the grey
-/// values stay the same.
+/// The image shifted by whole pixels with periodic continuation, so that all grey values are kept.
 fn shifted(image: &Array2<u8>, [x, y]: [isize; 2]) -> Array2<u8> {
     let (rows, columns) = image.dim();
     let from = |i: usize, by: isize, n: usize| (i as isize - by).rem_euclid(n as isize) as usize;
@@ -22,8 +21,8 @@ fn shifted(image: &Array2<u8>, [x, y]: [isize; 2]) -> Array2<u8> {
 }
 
 pub(crate) fn shifts(table: &mut Table, trial: &Trial, expected: &Answer) {
-    // The larger contact, 91 pixels in radius, stays clear of the edge: a contact that the edge
-    // cuts is left out of the modulus.
+    // The larger contact, with a radius of 91 pixels, does not reach the edge: a contact that is
+    // cut by the edge is left out of the modulus.
     for by in [[1, 0], [0, 1], [-17, 9], [40, -25], [-50, -20]] {
         let moved = Images::of(trial).map(|image| shifted(image, by));
         let found = answer(&pipeline(trial, SI), &moved);
@@ -33,8 +32,8 @@ pub(crate) fn shifts(table: &mut Table, trial: &Trial, expected: &Answer) {
     }
 }
 
-/// One of the seven ways to mirror and turn a frame: rows for columns first, then columns and rows
-/// in reverse.
+/// One of the seven ways to mirror and rotate a frame: first rows and columns are exchanged, then
+/// columns and rows are reversed.
 #[derive(Clone, Copy)]
 struct Turn {
     transposed: bool,
@@ -56,7 +55,7 @@ impl Turn {
         view.as_standard_layout().into_owned()
     }
 
-    /// Where (x, y) of a frame of this many columns and rows goes.
+    /// New position of (x, y) in a frame of this many columns and rows.
     fn point(self, [x, y]: [f64; 2], [columns, rows]: [f64; 2]) -> [f64; 2] {
         let (p, n) = if self.transposed {
             ([y, x], [rows, columns])
@@ -72,7 +71,7 @@ impl Turn {
         })
     }
 
-    /// The same for directions.
+    /// The rotation of directions.
     fn rotation(self) -> Matrix3<f64> {
         let sign = |k: usize| if k < 2 && self.reversed[k] { -1.0 } else { 1.0 };
         let from = |k: usize| if k < 2 && self.transposed { 1 - k } else { k };
@@ -100,8 +99,8 @@ pub(crate) fn turns(table: &mut Table, trial: &Trial, expected: &Answer) {
     }
 }
 
-/// The strain follows to the matcher's tolerance: points are placed from the first row on, and
-/// where the contact lies otherwise in the frame they are others.
+/// The strain agrees within the tolerance of the matcher: points are placed from the first row on,
+/// and differ if the contact has another orientation in the frame.
 fn compare(
     table: &mut Table,
     case: &str,

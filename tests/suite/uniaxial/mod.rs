@@ -1,5 +1,5 @@
-//! Specimens with a flat face, from simulated frames to the modulus: the case for which the paper's
-//! ratio (31) is exact.
+//! Specimens with a flat face, from simulated frames to the modulus: the case in which ratio (31)
+//! of the paper is exact.
 #![allow(clippy::print_stdout)]
 
 mod refusals;
@@ -15,7 +15,7 @@ use tactile_imaging::pipeline::{PipelineError, Session};
 use tactile_simulate::FaceOutline::{Ellipse, Rectangle};
 use tactile_simulate::Trial;
 
-/// What was seen to go wrong: 5 to 13 kPa for 103 kPa, and squeezed material said to stretch.
+/// Errors observed in the past: 5 to 13 kPa instead of 103 kPa, and stretch instead of compression.
 #[test]
 fn a_face_of_unknown_shape_has_its_area_its_modulus_and_a_strain_of_the_right_sign() {
     for outline in [Rectangle, Ellipse] {
@@ -41,7 +41,7 @@ fn a_face_of_unknown_shape_has_its_area_its_modulus_and_a_strain_of_the_right_si
                 let contact = press.contact(load).unwrap().unwrap();
                 let area = contact.face.unwrap().area_m2.value / state.area_m2;
                 assert!((area - 1.0).abs() < 1e-3, "{outline:?} {load}: {area}");
-                // The radius is that of a disc as large, and no fit of a ball's profile.
+                // The radius is that of a disc of equal area, not of a fitted ball profile.
                 let radius = contact.contact_radius_m.value;
                 let disc = std::f64::consts::PI * radius * radius / state.area_m2;
                 assert!((disc - 1.0).abs() < 1e-3, "{outline:?} {load}: {disc}");
@@ -94,7 +94,7 @@ fn a_session_reads_a_block_as_a_press_does() {
         session.push(frame.view()).unwrap();
     }
     let [one, other] = [press.modulus().unwrap(), session.modulus().unwrap()];
-    // The sums are taken in another order.
+    // The sums are computed in another order.
     assert!((one.youngs_modulus_pa / other.youngs_modulus_pa - 1.0).abs() < 1e-9);
     session.strain().unwrap();
     session.push(frames[0].view()).unwrap();

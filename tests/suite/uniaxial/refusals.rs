@@ -1,5 +1,5 @@
-//! Contacts of shapes that fit nothing: a refusal that says what to tell the program, or an
-//! interval that holds the truth.
+//! Contacts of shapes that fit no object: a refusal that names the missing input, or an interval
+//! that contains the true value.
 use crate::common::press_of;
 use ndarray::Array2;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -15,7 +15,7 @@ const FORCES_N: [f64; 3] = [0.2, 0.5, 0.8];
 const MODULUS_PA: f64 = 103e3;
 /// Unloaded area of the specimens.
 const AREA_M2: f64 = 100e-6;
-/// Grey levels of a pascal: the round contacts' middle stays below saturation.
+/// Grey levels per pascal: the middle of round contacts stays below saturation.
 const GREY_PER_PA: f64 = 8e-3;
 const DARK_GREY: f64 = 15.0;
 
@@ -27,18 +27,19 @@ enum Outline {
     Cut,
 }
 
-/// How the pressure lies under the outline and how the contact grows.
+/// Pressure distribution inside the outline, and growth of the contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Contact {
-    /// As under round bodies: it falls to zero at the outline, and lengths grow with the cube root
-    /// of the force.
+    /// As under round bodies: the pressure is zero at the outline, and lengths are proportional to
+    /// the cube root of the force.
     Round,
-    /// A specimen of that outline in uniaxial load: even, and the area grows with the strain.
+    /// A specimen of that outline under uniaxial load: the pressure is uniform, and the area grows
+    /// with the strain.
     Specimen,
 }
 
-/// Distance to the outline, positive inside, in units of the contact's size; `at` likewise, from
-/// its middle.
+/// Distance to the outline, positive inside, in units of the size of the contact. `at` is in the
+/// same units, from the middle.
 fn depth(outline: Outline, [x, y]: [f64; 2], turn: f64) -> f64 {
     let r = x.hypot(y);
     match outline {
@@ -62,7 +63,7 @@ fn unit_area(outline: Outline, turn: f64) -> f64 {
     inside.count() as f64 * (2.2 / STEPS as f64).powi(2)
 }
 
-/// Green–Lagrange squeeze of the specimen: F = E A₀ e λ with λ = √(1 − 2e).
+/// Green–Lagrange compression of the specimen: F = E A₀ e λ with λ = √(1 − 2e).
 fn squeeze(force_n: f64) -> f64 {
     let engineering = force_n / (MODULUS_PA * AREA_M2);
     (0..100).fold(0.0, |e: f64, _| engineering / (1.0 - 2.0 * e).sqrt())
@@ -76,7 +77,7 @@ fn camera() -> Camera {
     }
 }
 
-/// The frame under a force, its light in proportion to the pressure.
+/// The frame under a force, with light proportional to the pressure.
 fn frame(
     outline: Outline,
     contact: Contact,
@@ -84,7 +85,7 @@ fn frame(
     turn: f64,
     noise: (u64, u64),
 ) -> Array2<u8> {
-    // Under ν = ½, A = A₀ (1 + e).
+    // With ν = ½, A = A₀ (1 + e).
     let area_m2 = match contact {
         Contact::Round => AREA_M2 * (force_n / FORCES_N[2]).powf(2.0 / 3.0),
         Contact::Specimen => AREA_M2 * (1.0 + squeeze(force_n)),
@@ -119,7 +120,7 @@ fn frame(
     camera().expose(light.view(), noise.0, noise.1)
 }
 
-/// Two turns of every outline; `SEEDS=5` takes more.
+/// Two rotations of every outline. `SEEDS=5` tests five.
 #[test]
 fn shapes_that_fit_nothing_are_refused_or_their_interval_holds_the_truth() {
     let seeds = test_support::draws("SEEDS", 2);
@@ -156,6 +157,6 @@ fn shapes_that_fit_nothing_are_refused_or_their_interval_holds_the_truth() {
     }
     println!("{scenes} scenes, {refused} refused");
     assert_eq!(scenes, 8 * seeds);
-    // All but stars and rings that are specimens.
+    // All except stars and rings that are specimens.
     assert!(refused >= 6 * seeds, "{refused}");
 }

@@ -1,4 +1,4 @@
-//! Simulated faces and the sensor that reads them.
+//! Simulated faces and their sensor.
 use crate::common::press_of;
 use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::{Press, Settings};
@@ -7,7 +7,7 @@ use tactile_simulate::{
     Camera, Elastic, FaceOutline, SurfacePattern, UniaxialOptions, UniaxialScene,
 };
 
-/// A face of one brightness.
+/// A face of uniform brightness.
 pub(super) fn plain() -> SurfacePattern {
     SurfacePattern {
         bump_height_m: [0.0; 2],
@@ -20,7 +20,7 @@ pub(super) fn speckled() -> SurfacePattern {
     SurfacePattern::default()
 }
 
-/// A squeezed specimen and the camera above it.
+/// A compressed specimen and the camera above it.
 #[derive(Clone, Debug)]
 pub(super) struct Face {
     pub(super) outline: FaceOutline,
@@ -29,13 +29,13 @@ pub(super) struct Face {
     pub(super) poisson_ratio: f64,
     /// Side, or diameter.
     pub(super) face_m: [f64; 2],
-    /// Squeezes 1 − λ_z.
+    /// Compressions 1 − λ_z.
     pub(super) squeezes: Vec<f64>,
     pub(super) camera: Camera,
 }
 
 impl Default for Face {
-    /// A block of 12 mm and 103 kPa, squeezed by 2, 5 and 9 %, seen by 400 pixels over 16 mm.
+    /// A block of 12 mm and 103 kPa, compressed by 2, 5 and 9 %, seen by 400 pixels over 16 mm.
     fn default() -> Self {
         Self {
             outline: FaceOutline::Rectangle,
@@ -81,7 +81,7 @@ impl Face {
         .unwrap()
     }
 
-    /// A pipeline whose calibration is exact.
+    /// A pipeline with an exact calibration.
     pub(super) fn pipeline(&self, scene: &UniaxialScene, object: Object) -> Pipeline {
         let per_grey = self.camera.pixel_size_m.iter().product::<f64>() / scene.grey_per_pascal();
         let pairs = exact_pairs(per_grey);
@@ -97,7 +97,7 @@ impl Face {
     }
 }
 
-/// A calibration without errors, `per_grey` newtons a grey level.
+/// A calibration without errors, with `per_grey` newtons per grey level.
 pub(super) fn exact_pairs(per_grey: f64) -> Vec<CalibrationPair> {
     let values = [0.0, 5e6, 10e6, 15e6, 20e6, 25e6];
     values

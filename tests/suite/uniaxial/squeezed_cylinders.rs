@@ -1,5 +1,5 @@
-//! Cylinders solved by finite elements, their faces sliding or sticking: what the pipeline says of
-//! them.
+//! Cylinders solved by finite elements, with sliding or sticking faces, and the results of the
+//! pipeline.
 use super::scenes::exact_pairs;
 use crate::common::press_of;
 use tactile_imaging::elasticity::strain::Hencky;
@@ -12,8 +12,8 @@ use tactile_simulate::{
 
 const RADIUS_M: f64 = 6e-3;
 
-/// Everything that frames of a cylinder say, squeezed with the nominal stresses over E that are
-/// given.
+/// All results from the frames of a cylinder that is compressed with the given nominal stresses
+/// over E.
 fn measured(
     faces: Interface,
     aspect: f64,
@@ -58,7 +58,7 @@ fn measured(
     press_of(&pipeline, made.reference.view(), made.frames).measure()
 }
 
-/// What was found of a cylinder.
+/// The measured results of a cylinder, as text.
 fn said(found: &Measurement, modulus_pa: f64) -> String {
     match &found.youngs_modulus_pa {
         Ok(modulus) => {
@@ -72,7 +72,7 @@ fn said(found: &Measurement, modulus_pa: f64) -> String {
 /// Nominal stresses over the modulus.
 const LOADS: [&[f64]; 2] = [&[0.02, 0.05, 0.1], &[0.01, 0.02, 0.03, 0.04]];
 
-/// What the specimens are said to be.
+/// The stated shape of the specimens.
 const CYLINDER: Object = Object::Cylinder { poisson_ratio: 0.5 };
 
 #[test]
@@ -90,7 +90,7 @@ fn a_sliding_face_gives_the_modulus_of_rubber_or_a_caution() {
         println!("{loads:?}: Green-Lagrange {}", said(&green, modulus_pa));
         println!("{loads:?}: Hencky {}", said(&hencky, modulus_pa));
         assert!(cautioned(&green));
-        // Squeezed by 4 % logarithmic strain needs none, by 9 % it does.
+        // A logarithmic strain of 4 % needs no caution, and 9 % needs one.
         assert_eq!(cautioned(&hencky), loads == LOADS[0]);
         let error = hencky.youngs_modulus_pa.unwrap().value / modulus_pa - 1.0;
         let allowed = if loads == LOADS[0] { 0.07 } else { 0.05 };

@@ -1,4 +1,4 @@
-//! Errors and coverage over many specimens.
+//! Errors and coverage for many specimens.
 use super::scenes::{Face, plain, speckled};
 use crate::common::Study;
 use ndarray::Array2;
@@ -9,14 +9,13 @@ use tactile_imaging::pipeline::LightContact;
 use tactile_imaging::{Object, Pipeline};
 use tactile_simulate::FaceOutline;
 
-/// Relative error that all readings of a gauge share: what a pipeline assumes unless told otherwise
-/// (`Source::Gain`).
+/// Relative error common to all readings of a gauge: the default of a pipeline (`Source::Gain`).
 const GAUGE_SCALE: f64 = 1e-3;
-/// Error of each reading, of its range.
+/// Error of each reading, relative to the range.
 const GAUGE_NOISE: f64 = 2e-3;
 
 /// One specimen: cylinder or block, plain or speckled, 30 to 250 kPa, four to eight loads up to 4
-/// to 10 %, read with a gauge.
+/// to 10 %, measured with a gauge.
 fn measure(seed: u64, study: &mut Study) {
     let mut rng = ChaCha8Rng::seed_from_u64(1000 + seed);
     let mut uniform = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
@@ -61,7 +60,7 @@ fn measure(seed: u64, study: &mut Study) {
     }
 }
 
-/// A dozen specimens by default; `SCENES=100` for the study (`.ci/run studies`).
+/// A dozen specimens by default, and `SCENES=100` for the study (`.ci/run studies`).
 #[test]
 fn moduli_of_blocks_and_cylinders_are_right_and_their_intervals_hold() {
     let count = test_support::draws("SCENES", 12);

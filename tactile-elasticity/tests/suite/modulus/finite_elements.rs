@@ -1,8 +1,8 @@
-//! Estimators against balls pressed in finite elements at finite strain.
+//! Estimators tested on balls pressed in finite elements at finite strain.
 
 use super::*;
 
-/// A load of a scene: force, contact radius.
+/// A load of a scene: force and contact radius.
 struct Scene {
     name: String,
     youngs_modulus_pa: f64,
@@ -12,7 +12,7 @@ struct Scene {
     loads: Vec<LoadState>,
 }
 
-/// The scenes of `fem_press/scenes.csv`; none with one printed line where the data are not there.
+/// The scenes of `fem_press/scenes.csv`. Without the data there are none, and a line is printed.
 fn scenes() -> Vec<Scene> {
     let Some(path) = test_support::published("fem_press/scenes.csv") else {
         return Vec::new();
@@ -20,7 +20,7 @@ fn scenes() -> Vec<Scene> {
     let text = std::fs::read_to_string(path).expect("readable");
     let mut scenes: Vec<Scene> = Vec::new();
     for line in text.lines().skip(1) {
-        // The layers are a quoted JSON list with commas of its own.
+        // The layers are a quoted JSON list that contains commas.
         let open = line.find('[').expect("layers");
         let close = line.find(']').expect("layers");
         let layers: Vec<serde_json::Value> =
@@ -58,7 +58,7 @@ fn scenes() -> Vec<Scene> {
     scenes
 }
 
-/// `--nocapture` prints every error beside the standard error.
+/// `--nocapture` prints every error and its standard error.
 #[allow(clippy::print_stdout)]
 #[test]
 fn balls_are_read_through_layers_and_on_a_flat() {

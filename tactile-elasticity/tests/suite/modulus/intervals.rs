@@ -1,4 +1,4 @@
-//! Intervals cover what they promise.
+//! Intervals have their nominal coverage.
 
 use super::*;
 
@@ -38,8 +38,8 @@ fn intervals_cover_what_they_promise() {
     assert!((1860..=1940).contains(&covered), "{covered} of 2000");
 }
 
-/// 2000 experiments whose lengths and guide are wrong together, as where the guide was checked by
-/// the same pixels: 95 % ± four standard deviations of the count.
+/// 2000 experiments with correlated errors of lengths and guide, as if the guide had been checked
+/// with the same pixels: 95 % ± four standard deviations of the count.
 #[test]
 fn intervals_cover_where_lengths_and_the_guide_err_together() {
     let loads = hertz_loads(waveguide().as_body(), &[2e-3, 6e-3]);
@@ -86,9 +86,9 @@ fn intervals_cover_where_lengths_and_the_guide_err_together() {
     }
 }
 
-/// Johnson, Kendall and Roberts: with Q² = 6πwR P₁ and P₁ = F + Q the contact's radius is that of
-/// P₁, its pressure is p₀ (s - ε/s) with s = √(1 − r²/a²) and ε = Q/3P₁. Light shows where it is
-/// positive, s² > ε: a force P₁ (1 − 3ε + 2ε^(3/2)), in a radius a √(1 − ε).
+/// Johnson, Kendall and Roberts: with Q² = 6πwR P₁ and P₁ = F + Q, the contact has the radius for
+/// P₁ and the pressure p₀ (s - ε/s) with s = √(1 − r²/a²) and ε = Q/3P₁. Light is visible where the
+/// pressure is positive, s² > ε: a force of P₁ (1 − 3ε + 2ε^(3/2)) within a radius of a √(1 − ε).
 #[test]
 fn adhesion_is_as_wide_as_the_contact_it_makes() {
     let force_n = 0.02;
@@ -106,7 +106,7 @@ fn adhesion_is_as_wide_as_the_contact_it_makes() {
         let estimator = HertzSphere::new(4e-3, NU).unwrap();
         let found = estimator.estimate(&series).unwrap();
         let stated = found.standard_error_pa / SAMPLE;
-        // The missing rim takes off up to a third at 7 % of the force.
+        // The missing rim reduces the result by up to a third at 7 % of the force.
         assert!(
             softer < stated && stated < 1.6 * softer,
             "{adhesion_n}: {softer} {stated}"
@@ -124,7 +124,7 @@ fn a_source_is_one_error_in_all_loads() {
     let found = plain.estimate(&gauged(loads.clone(), 0.01)).unwrap();
     assert!((found.standard_error_pa / SAMPLE - 0.01).abs() < 1e-9);
     assert!((found.by_source.share(Source::Gain) - 1.0).abs() < 1e-9);
-    // As noise it is another one in each, and their mean is better known.
+    // As noise the error is independent in each load, and their mean is more accurate.
     let noisy: Vec<_> = (loads.iter())
         .map(|load| LoadState {
             force_n: load.force_n.by_relative(Source::Noise, 0.01),
@@ -161,7 +161,7 @@ fn forces_that_share_an_error_cancel_in_their_ratio_not_in_their_mean() {
     let ratio = PaperRatio::default().with_reference(StrainReference::FirstLoad);
     let exactly = [strained(0.02, 0.0), strained(0.08, 0.01)].to_vec();
     let common = ratio.estimate(&gauged(exactly, 0.01)).unwrap();
-    // One factor on both forces is one factor on their difference: 1 %.
+    // A common factor of both forces is a factor of their difference: 1 %.
     assert!((common.standard_error_pa / common.youngs_modulus_pa - 0.01).abs() < 1e-12);
     // Independent errors of 1 % of 20 and 80 mN on a difference of 60 mN.
     let apart = ratio.estimate(&loads).unwrap();
@@ -169,7 +169,7 @@ fn forces_that_share_an_error_cancel_in_their_ratio_not_in_their_mean() {
     assert!((apart.standard_error_pa / apart.youngs_modulus_pa - expected).abs() < 1e-12);
 }
 
-/// Student's t, and the mean quantile of Cochran and Cox, against quantiles from tables.
+/// Student's t and the mean quantile of Cochran and Cox, compared with quantiles from tables.
 #[test]
 fn errors_learnt_from_few_repetitions_widen_the_interval() {
     let load = |force: Estimate, strain: Estimate| {
@@ -188,16 +188,16 @@ fn errors_learnt_from_few_repetitions_widen_the_interval() {
     assert!((half_width(&load(force, strain)) - 1.959_964).abs() < 1e-5);
     let learnt = force.with_degrees_of_freedom(5.0);
     assert!((half_width(&load(learnt, exact(0.02))) - 2.570_582).abs() < 1e-5);
-    // Half of the variance with five degrees of freedom, half known: the mean of both quantiles,
-    // interpolated to 1 %.
+    // Half of the variance has five degrees of freedom, and half is known: the mean of both
+    // quantiles, interpolated to 1 %.
     assert!((half_width(&load(learnt, strain)) / 2.265_273 - 1.0).abs() < 0.01);
     let refused =
         PaperRatio::default().estimate(&load(force.with_degrees_of_freedom(f64::NAN), strain));
     assert!(refused.is_err());
 }
 
-/// A regression of many loads takes time and memory in proportion to them: a matrix of all pairs of
-/// these would be 3 GB.
+/// A regression of many loads needs time and memory proportional to their number: a matrix of all
+/// pairs would be 3 GB.
 #[test]
 fn twenty_thousand_loads_are_one_linear_regression() {
     let forces: Vec<f64> = (0..20_000).map(|i| 1e-3 + 1e-7 * f64::from(i)).collect();
@@ -221,8 +221,8 @@ fn twenty_thousand_loads_are_one_linear_regression() {
         .unwrap()
         .estimate(&series)
         .unwrap();
-    // The errors of single loads average to 0.005 % (force 0.5 %, three times the radius's 0.4 %
-    // and 1.5 times the depth's 1 %, by √20000): the shared 0.01 % stays.
+    // The errors of single loads average to 0.005 % (0.5 % of the force, three times the 0.4 % of
+    // the radius and 1.5 times the 1 % of the depth, divided by √20000). The common 0.01 % remains.
     let relative = hertz.standard_error_pa / hertz.youngs_modulus_pa;
     assert!((1e-4..1.4e-4).contains(&relative), "{relative}");
     assert!((hertz.youngs_modulus_pa / SAMPLE - 1.0).abs() < 4.0 * relative);
@@ -235,9 +235,9 @@ fn twenty_thousand_loads_are_one_linear_regression() {
     assert_eq!(ratio.fit.observations, 20_000);
 }
 
-/// A ball on a layer thin beside its contact and stiff beneath: there the plain iteration for the
-/// guide's part of the compliance swings between two values, and gave an interval that was reversed
-/// and missed its own estimate.
+/// A ball on a layer that is thin relative to the contact, on a stiff base. There a plain iteration
+/// for the compliance of the guide oscillates between two values, and gave a reversed interval
+/// without its own estimate.
 #[test]
 fn a_thin_layer_on_a_stiff_base_has_an_interval_around_its_estimate() {
     let guide = guide(&[[1e-3, 100e3]], 0.495);
@@ -261,8 +261,8 @@ fn holds_its_estimate(found: &ModulusEstimate) {
         interval.upper.is_none_or(|upper| estimate < upper),
         "{found:?}"
     );
-    // To first order the interval is as wide as its standard error: an end that did not converge is
-    // not. Scatter that exceeds the errors widens it by Student's t.
+    // To first order the width of the interval corresponds to the standard error, unless an end has
+    // not converged. Scatter in excess of the errors widens it by Student's t.
     let excess = |w: &Warning| matches!(w, Warning::ExcessScatter { .. });
     let first_order = estimate - 1.96 * found.standard_error_pa;
     let off = (interval.lower - first_order) / found.standard_error_pa;
@@ -274,7 +274,7 @@ fn holds_its_estimate(found: &ModulusEstimate) {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Guides of one or two layers, balls and loads at random.
+    /// Random guides of one or two layers, balls and loads.
     #[test]
     fn an_interval_holds_its_own_estimate(
         thickness in 0.15..3.0f64,
@@ -305,8 +305,9 @@ proptest! {
     }
 }
 
-/// Where the guide takes most of the compliance the interval is open only if its error reaches the
-/// whole: below, both ends are near those of the logarithm's normal distribution.
+/// If the guide contributes most of the compliance, the interval is open only if the error of the
+/// guide includes the whole compliance. Otherwise both ends are near those of the normal
+/// distribution of the logarithm.
 #[test]
 fn both_ends_are_found_where_the_guide_takes_most_of_the_compliance() {
     let layer = |thickness_m, youngs_modulus_pa| Layer {

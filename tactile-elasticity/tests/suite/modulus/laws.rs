@@ -1,4 +1,4 @@
-//! Every law inverts itself, says where it does not reach, and is chosen where it belongs.
+//! Every law is its own inverse, reports where it is not valid, and is chosen where it is.
 
 use super::*;
 
@@ -63,11 +63,11 @@ fn a_sphere_on_layers_inverts_itself() {
         .unwrap()
         .without_finite_strain();
     let found = linear.estimate(&LoadSeries::new(loads.as_slice())).unwrap();
-    // The table's interpolation, 5·10⁻⁶ in ln F.
+    // The interpolation of the table, 5·10⁻⁶ in ln F.
     let gap = found.youngs_modulus_pa / SAMPLE - 1.0;
     assert!(gap.abs() < 3e-5, "{gap:e}");
-    // In series the soft layers below count as if they were touched: half as much again, or twice
-    // the modulus.
+    // In series the soft layers below contribute as if they were in contact: the modulus is larger
+    // by half, or doubled.
     let deep = |load| {
         let estimator = HertzSphere::new(4e-3, NU).unwrap().with_waveguide(&guide);
         let found = estimator.estimate(&LoadSeries::new([load])).unwrap();
@@ -88,13 +88,13 @@ fn a_rigid_flat_and_a_deep_layer_are_hertz() {
     let found = layered
         .without_finite_strain()
         .estimate(&LoadSeries::new(loads));
-    // a/h is 10⁻⁵, and the layer's effect of that order.
+    // a/h is 10⁻⁵, and the effect of the layer is of the same order.
     assert!((found.unwrap().youngs_modulus_pa / SAMPLE - 1.0).abs() < 1e-4);
 }
 
 #[test]
 fn far_stiffer_samples_are_bounded_from_below_only() {
-    // A sample of 5 MPa through a waveguide of 50 kPa: 1 % of noise in a leaves no upper limit.
+    // A sample of 5 MPa on a waveguide of 50 kPa: with 1 % of noise in a there is no upper limit.
     let guide = waveguide();
     let e = reduced_modulus_pa(guide.as_body(), Body::elastic(5e6, NU).unwrap()).unwrap();
     let load = |f: f64, error: f64| {
@@ -117,8 +117,8 @@ fn far_stiffer_samples_are_bounded_from_below_only() {
     assert!(lower_bound_pa.unwrap() > 200e3);
 }
 
-/// Balls from softer to stiffer than the guide, larger and smaller than it is deep: the share of
-/// compliance that belongs to the answer is found everywhere.
+/// Balls softer and stiffer than the guide, larger and smaller than its thickness: the fraction of
+/// the compliance that belongs to the sample is always found.
 #[test]
 fn balls_of_every_stiffness_and_size_invert_on_layers() {
     for guide in &[waveguide(), guide(&[[4e-3, 50e3]], 0.495)] {
@@ -135,8 +135,8 @@ fn balls_of_every_stiffness_and_size_invert_on_layers() {
                     let load = by_radius(layered_load(guide, radius, modulus, a));
                     let found = estimator.estimate(&LoadSeries::new([load])).unwrap();
                     let gap = found.youngs_modulus_pa / modulus - 1.0;
-                    // The table's 5·10⁻⁶ in ln F, times what the guide's own compliance makes of
-                    // it.
+                    // The 5·10⁻⁶ of the table in ln F, times the amplification by the compliance of
+                    // the guide.
                     assert!(gap.abs() < 2e-4, "{radius} {modulus} {a}: {gap:e}");
                 }
             }

@@ -1,4 +1,5 @@
-//! Every estimator finds what its own law was fed, says how well, and refuses what it cannot use.
+//! Every estimator recovers the modulus from loads of its own law, with its error, and refuses
+//! loads that it cannot use.
 
 mod finite_elements;
 mod intervals;
@@ -54,7 +55,7 @@ fn hertz_loads(other: Body, forces: &[f64]) -> Vec<LoadState> {
         .collect()
 }
 
-/// A load without what was measured of its depth.
+/// A load without its measured depth.
 fn by_radius(load: LoadState) -> LoadState {
     LoadState {
         indentation_m: None,
@@ -70,7 +71,7 @@ fn by_depth(load: LoadState) -> LoadState {
     }
 }
 
-/// Loads whose forces are all wrong by one factor, known to this.
+/// Loads whose forces have a common relative error of this size.
 fn gauged(mut loads: Vec<LoadState>, relative: f64) -> LoadSeries {
     for load in &mut loads {
         load.force_n = load.force_n.by_relative(Source::Gain, relative);

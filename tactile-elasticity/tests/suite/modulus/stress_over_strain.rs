@@ -1,4 +1,4 @@
-//! The paper's ratio and the regression; bad input of all estimators.
+//! The ratio of the paper and the regression; invalid input of all estimators.
 
 use super::*;
 
@@ -17,7 +17,7 @@ fn stress_over_strain() {
         &StressStrainRegression::default().with_zero_at_origin(),
         &line,
     );
-    // An offset biases the ratio, not the slope, and is found.
+    // An offset biases the ratio, but not the slope, and is detected.
     let wobble = [3.0, -3.0, -3.0, 3.0];
     let offset: Vec<_> = [0.01, 0.02, 0.03, 0.04]
         .iter()

@@ -1,4 +1,4 @@
-//! All matchers, and what must hold of the answer of any of them.
+//! All matchers, and requirements for the results of each.
 
 use nalgebra::Point;
 use tactile_match::labelling::Neighbourhood;
@@ -9,10 +9,9 @@ use tactile_match::{
 
 pub(crate) type Matchers<const D: usize> = Vec<(&'static str, Box<dyn PointMatcher<D>>)>;
 
-/// The matchers that every test file runs. A new one is added here and nowhere else.
+/// The matchers used by every test file. A new one is added only here.
 pub(crate) fn matchers<const D: usize>() -> Matchers<D> {
-    // Eight neighbours instead of half of all points: what is checked here does not need the time
-    // of the latter.
+    // Eight neighbours instead of half of all points, to save time: the checks do not depend on it.
     let options = RelaxationLabelling::default().with_neighbourhood(Neighbourhood::Nearest(8));
     let dense = options.expect("neighbours");
     vec![
@@ -35,7 +34,7 @@ pub(crate) fn matchers<const D: usize>() -> Matchers<D> {
     ]
 }
 
-/// The modes of the default matcher that search otherwise.
+/// The modes of the default matcher with a different search.
 pub(crate) fn modes<const D: usize>() -> Matchers<D> {
     let options = AnnealedSoftassign::default();
     let moves = |transformation| Box::new(options.with_transformation(transformation));
@@ -49,7 +48,7 @@ pub(crate) fn modes<const D: usize>() -> Matchers<D> {
     ]
 }
 
-/// What holds of every [`Matching`], whatever it was made from.
+/// Requirements for every [`Matching`], whatever its origin.
 pub(crate) fn assert_consistent<const D: usize>(
     name: &str,
     model: &[Point<f64, D>],
@@ -93,8 +92,8 @@ pub(crate) fn assert_consistent<const D: usize>(
         matching.warped
     );
     for (i, (point, warped)) in model.iter().zip(&matching.warped).enumerate() {
-        // Rounding of a spline's sum, whose terms may exceed the set's size by some orders of
-        // magnitude.
+        // Rounding of the sum of a spline, whose terms may exceed the size of the set by some
+        // orders of magnitude.
         let size = target
             .iter()
             .chain(&matching.warped)
@@ -129,7 +128,7 @@ pub(crate) fn assert_consistent<const D: usize>(
     );
 }
 
-/// No target twice. Matched and unmatched rows together are all rows.
+/// No target occurs twice, and matched and unmatched rows together are all rows.
 fn assert_partition<const D: usize>(name: &str, columns: usize, matching: &Matching<D>) {
     let mut seen = vec![false; columns];
     for &j in matching

@@ -1,4 +1,4 @@
-//! Matchers, point sets and checks that the test files share.
+//! Matchers, point sets and checks used by the test files.
 
 pub(crate) mod contract;
 
@@ -8,7 +8,7 @@ use nalgebra::{Point, SMatrix, SVector};
 use proptest::prelude::*;
 use tactile_match::{Matching, PointMatcher};
 
-/// Largest distance of two points of the same row.
+/// Largest distance between two points of the same row.
 pub(crate) fn largest_step<const D: usize>(a: &[Point<f64, D>], b: &[Point<f64, D>]) -> f64 {
     a.iter()
         .zip(b)
@@ -16,7 +16,7 @@ pub(crate) fn largest_step<const D: usize>(a: &[Point<f64, D>], b: &[Point<f64, 
         .fold(0.0, f64::max)
 }
 
-/// A repeatable stream of numbers in [0, 1), the same for every scalar type.
+/// A reproducible stream of numbers in [0, 1), the same for every scalar type.
 pub(crate) struct Stream(u64);
 
 impl Stream {
@@ -33,7 +33,7 @@ impl Stream {
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// A normal deviate, nearly: the sum of twelve uniform ones.
+    /// An approximately normal deviate: the sum of twelve uniform ones.
     pub(crate) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.next()).sum::<f64>() - 6.0
     }
@@ -48,8 +48,8 @@ impl Stream {
     }
 }
 
-/// A model, where its points truly go, and targets: `order[j]` is the model row of target `j`, rows
-/// beyond are outliers.
+/// A model, the true positions of its points, and targets. `order[j]` is the model row of target
+/// `j`; further targets are outliers.
 pub(crate) struct Scene<const D: usize> {
     pub(crate) model: Vec<Point<f64, D>>,
     pub(crate) truth: Vec<Point<f64, D>>,
@@ -58,7 +58,7 @@ pub(crate) struct Scene<const D: usize> {
 }
 
 impl<const D: usize> Scene<D> {
-    /// The true positions in this order, each with its standard deviation of Gaussian noise, and
+    /// The true positions in this order, with Gaussian noise of the given standard deviation, and
     /// outliers in the unit cube.
     pub(crate) fn new(
         model: Vec<Point<f64, D>>,
@@ -92,7 +92,7 @@ impl<const D: usize> Scene<D> {
         self.order.get(j) == Some(&i)
     }
 
-    /// How many model points have their own partner.
+    /// Number of model points with their own partner.
     pub(crate) fn right(&self, assignment: &[Option<usize>]) -> usize {
         let rows = assignment.iter().enumerate();
         rows.filter(|&(i, partner)| partner.is_some_and(|j| self.is_right(i, j)))
@@ -107,7 +107,7 @@ impl<const D: usize> Scene<D> {
     }
 }
 
-/// A match that must succeed and be consistent.
+/// Matches the scene. The match must succeed and be consistent.
 pub(crate) fn matched<const D: usize>(
     name: &str,
     matcher: &dyn PointMatcher<D>,
@@ -121,8 +121,8 @@ pub(crate) fn matched<const D: usize>(
     matching
 }
 
-/// `n` points, no two closer than about half the spacing of a regular arrangement: a jittered
-/// lattice of the unit cube.
+/// `n` points of a jittered lattice of the unit cube, no two of which are closer than about half of
+/// the regular spacing.
 pub(crate) fn scattered<const D: usize>(n: usize, seed: u64) -> Vec<Point<f64, D>> {
     let side = (n as f64).powf(1.0 / D as f64).ceil() as usize;
     let mut stream = Stream::new(seed);
@@ -175,7 +175,7 @@ pub(crate) fn rotation<const D: usize>(angle: f64) -> SMatrix<f64, D, D> {
     r
 }
 
-/// Coordinates a caller may come with by mistake.
+/// Coordinates that a caller may pass by mistake.
 pub(crate) fn hostile_coordinate() -> impl Strategy<Value = f64> {
     prop_oneof![
         8 => -1.0..1.0_f64,

@@ -1,7 +1,7 @@
-//! The inputs kept for the fuzz target `matcher`, once more: regular, scattered and extreme points
-//! in the plane and in space.
+//! Replays the inputs kept for the fuzz target `matcher`: regular, scattered and extreme points in
+//! the plane and in space.
 //!
-//! `fuzz/README.md` says how to look for more.
+//! `fuzz/README.md` describes how to search for more.
 #![allow(clippy::print_stdout)] // the input that is checked, shown where a check fails
 
 pub(crate) mod points;

@@ -1,16 +1,16 @@
-//! Point sets made from any bytes, and what must hold of every matcher's answer to them.
+//! Point sets made from any bytes, and requirements for the result of every matcher.
 //!
-//! Shared by the replay of the kept corpus and by the fuzz target `matcher` of `fuzz/`.
+//! Used by the replay of the kept corpus and by the fuzz target `matcher` in `fuzz/`.
 
 use super::contract::{assert_consistent, matchers, modes};
 use nalgebra::{Point, SVector};
 use tactile_match::MatchError;
 
-/// Largest number of points of a set: enough for every stage of the matchers, few enough for a
-/// thousand inputs a minute.
+/// Largest number of points of a set: enough for every stage of the matchers, and small enough for
+/// a thousand inputs per minute.
 const MOST: usize = 24;
 
-/// Values that arithmetic meets its limits with.
+/// Values at the limits of arithmetic.
 const EXTREMES: [f64; 12] = [
     -0.0,
     5e-324,
@@ -26,12 +26,12 @@ const EXTREMES: [f64; 12] = [
     f64::NAN,
 ];
 
-/// Reads two sets of points and gives them to every matcher.
+/// Reads two sets of points and passes them to every matcher.
 ///
-/// The first byte says whether the points lie in the plane or in space and whether the target is
-/// the model moved. The second and third how many there are. Then come coordinates: a byte below
-/// 200 is a multiple of a tenth, above it an extreme value, and 255 stands before the eight bytes
-/// of any number. What is not there is zero.
+/// The first byte determines whether the points lie in the plane or in space, and whether the
+/// target is the displaced model. The second and the third are the numbers of points. Then come
+/// coordinates: a byte below 200 is a multiple of a tenth, a byte above it an extreme value, and
+/// 255 precedes the eight bytes of any number. Missing bytes are zero.
 pub(crate) fn matcher(bytes: &[u8]) {
     let mut bytes = bytes.iter().copied();
     let mut next = || bytes.next().unwrap_or(0);
@@ -65,10 +65,9 @@ fn either_dimension<const D: usize>(
     every_matcher(&model, &target);
 }
 
-/// Every matcher gives a consistent answer, or says that a coordinate cannot be used where one
-/// cannot.
+/// Every matcher gives a consistent result, or an error if a coordinate is unusable.
 pub(crate) fn every_matcher<const D: usize>(model: &[Point<f64, D>], target: &[Point<f64, D>]) {
-    // A coordinate is usable where the square of a difference of two such is finite.
+    // A coordinate is usable if the square of a difference of two such coordinates is finite.
     let sixteen = 16.0;
     let usable = |p: &Point<f64, D>| p.iter().all(|&c| (c * c * sixteen).is_finite());
     let all_usable = model.iter().chain(target).all(usable);

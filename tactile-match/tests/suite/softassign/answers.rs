@@ -1,4 +1,4 @@
-//! What is found: clean and noisy warps, outliers.
+//! Results for clean and noisy warps and outliers.
 use crate::common::{self, Scene};
 use nalgebra::{Point2, Point3};
 use tactile_match::{AnnealedSoftassign, Outliers, PointMatcher, StopReason};
@@ -11,12 +11,12 @@ fn all_right<const D: usize>(n: usize) {
     assert_eq!(scene.right(&found.assignment), n);
     assert_eq!(found.report.stop, StopReason::Exact);
     for (i, (p, truth)) in scene.model.iter().zip(&scene.truth).enumerate() {
-        // Interpolation of clean pairs: rounding of the spline's solution alone.
+        // Interpolation of clean pairs: only the rounding of the solution of the spline.
         assert!((found.warp.apply(p) - truth).norm() < 1e-9);
         assert!((found.warped[i] - truth).norm() < 1e-12 && found.confidence[i] > 0.9);
     }
     assert!(found.unmatched_model.is_empty() && found.unmatched_target.is_empty());
-    // Exact says that the points returned lie on their partners.
+    // Exact means that the returned points coincide with their partners.
     assert!(found.report.residual < 1e-12);
 }
 
@@ -27,11 +27,11 @@ fn clean_warps_of_plane_and_space_are_found_exactly() {
     all_right::<2>(502);
 }
 
-/// Where noise is well below the spacing, the first run ends at the noise: it does not fall below
-/// it, where points lose their partners and a second start has to find them again.
+/// If the noise is well below the spacing, the first run ends at the noise. At lower temperatures
+/// points would lose their partners, and a second start would have to find them again.
 #[test]
 fn noise_below_the_spacing_rarely_takes_a_third_start() {
-    /// A tenth of the spacing, (1/105)^⅓ of the cube's side, to either side.
+    /// A tenth of the spacing, (1/105)^⅓ of the side of the cube, in both directions.
     const NOISE: f64 = 0.02;
     let mut of_few_starts = 0;
     for seed in 0..8 {
@@ -52,19 +52,18 @@ fn noise_below_the_spacing_rarely_takes_a_third_start() {
             .filter(|&(j, &i)| found.assignment[i] == Some(j))
             .count();
         assert!(right >= 104, "{seed}: {right}");
-        // The field is smooth: its points are nearer to the truth than the noise, of standard
-        // deviation NOISE/√3 along an axis, puts one.
+        // The field is smooth: its points are closer to the true positions than the noise with its
+        // standard deviation NOISE/√3 per axis.
         let squares = (found.warped.iter().zip(&truth)).map(|(w, t)| (w - t).norm_squared());
         let error = (squares.sum::<f64>() / 105.0).sqrt();
         assert!(error < 0.8 * NOISE, "{seed}: {error}");
     }
-    // The first start follows the sets as they lie. If a point of the eight sets has strayed too
-    // far to be called matched, a third start looks for it; without a sign of noise all take it.
+    // The first start follows the sets at their positions. If a point of the eight sets is too far
+    // away to be matched, a third start searches for it. Without a sign of noise all sets use it.
     assert!(of_few_starts >= 4, "{of_few_starts}");
 }
 
-/// Where no outliers are expected every point gets a partner. Where they are, a far point is left
-/// without.
+/// If no outliers are expected, every point gets a partner. Otherwise a distant point has none.
 #[test]
 fn the_outliers_option_says_which_side_may_stay_alone() {
     let mut scene = Scene::<2>::bent(31, 0.06, 22);
@@ -75,7 +74,7 @@ fn the_outliers_option_says_which_side_may_stay_alone() {
         let found = options.match_points(model, target).unwrap();
         assert_eq!(scene.right(&found.assignment), 31);
         assert_eq!(found.unmatched_target, [31]);
-        // The sides change places: now it is a model point that has no partner.
+        // The sides are exchanged: now a model point has no partner.
         let other = if side == Outliers::Target {
             Outliers::Model
         } else {

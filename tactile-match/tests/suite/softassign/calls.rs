@@ -1,4 +1,4 @@
-//! How it is called: wrong options, the callback, reused workspaces, batches.
+//! Calls: invalid options, the callback, reused workspaces, batches.
 use crate::common::{Scene, bend, scattered};
 use nalgebra::Point2;
 use std::ops::ControlFlow;
@@ -37,8 +37,8 @@ fn the_callback_hears_every_iteration_and_stops_the_search() {
     );
 }
 
-/// Clean, noisy and unusable pairs of different sizes: a workspace that has seen one must not
-/// colour the next.
+/// Clean, noisy and unusable pairs of different sizes: the use of a workspace for one of them must
+/// not affect the next.
 #[test]
 fn a_batch_gives_the_bits_of_single_matches() {
     let models = [31, 24, 0, 37].map(|n| scattered::<2>(n, 24));

@@ -1,3 +1,3 @@
-//! Annealed softassign: what it finds, and how it is called.
+//! Annealed softassign: results and calls.
 mod answers;
 mod calls;

@@ -1,5 +1,5 @@
 //! Surfaces with closed forms and their images under frontal light, and all implementations, for
-//! tests that must hold for each.
+//! tests of all of them.
 #![allow(unreachable_pub)]
 
 mod quality;
@@ -9,11 +9,11 @@ use tactile_sfs::*;
 
 pub use quality::{Alignment, HeightError, height_error, render};
 
-/// Heights and slopes of a closed form at a point of the square [−1, 1]²; `None` outside its
+/// Heights and slopes of a closed form at a point of the square [−1, 1]². `None` outside its
 /// support.
 pub type Shape = fn(f64, f64) -> Option<[f64; 3]>;
 
-/// A surface sampled on n × n pixels of size 2/n, with what is seen of it.
+/// A surface sampled on n × n pixels of size 2/n, with its image.
 pub struct Sampled {
     pub pixel: f64,
     pub z: Array2<f64>,
@@ -49,14 +49,14 @@ impl Sampled {
         }
     }
 
-    /// Its pixels inside the mask.
+    /// The pixels inside the mask.
     pub fn domain(&self) -> Domain<'_, f64> {
         let domain = Domain::new([self.pixel; 2]).unwrap();
         domain.with_mask(self.mask.view())
     }
 }
 
-/// Errors of a surface where it has heights, as they are or but for a constant.
+/// Errors of a surface at pixels with a height, unchanged or up to a constant.
 pub fn errors<T: PixelScalar>(
     surface: &Surface<T>,
     truth: &Array2<f64>,

@@ -1,9 +1,9 @@
-//! Errors of a surface against the truth, and shaded images of one.
+//! Errors of a surface relative to the truth, and shaded images of a surface.
 
 use ndarray::{Array2, ArrayView2};
 use tactile_sfs::{Lighting, slopes};
 
-/// What is fitted, by least squares, before heights are compared.
+/// The least-squares fit before heights are compared.
 #[derive(Clone, Copy, Debug)]
 pub enum Alignment {
     None,
@@ -20,7 +20,7 @@ pub struct HeightError {
     pub max: f64,
     /// 1 unless affine.
     pub scale: f64,
-    /// Mean absolute error of the best constant, the median: what a method must beat.
+    /// Mean absolute error of the best constant, the median: a method must be better.
     pub constant_guess: f64,
     /// Range of the true heights.
     pub range: f64,
@@ -44,7 +44,7 @@ pub fn height_error(
         Alignment::None => (1.0, 0.0),
         Alignment::Offset => (1.0, t - z),
         Alignment::Affine => {
-            // About the means: raw second moments of heights far from 0 cancel.
+            // Relative to the means: second moments of heights far from 0 would cancel.
             let zz = mean(&|pair| (pair.0 - z) * (pair.0 - z));
             let zt = mean(&|pair| (pair.0 - z) * (pair.1 - t));
             let scale = if zz > 0.0 { zt / zz } else { 1.0 };
@@ -71,7 +71,7 @@ pub fn height_error(
     }
 }
 
-/// Shades a surface. NaN where it has no height.
+/// Shades a surface. NaN at pixels without a height.
 pub fn render(
     heights: ArrayView2<'_, f64>,
     pixel_size: [f64; 2],

@@ -1,4 +1,4 @@
-//! Points and maps that the tests share.
+//! Points and maps used by the tests.
 
 use nalgebra::{Point, SVector};
 use tactile_tps::{FitOptions, Kernel, Smoothing, ThinPlateSpline};
@@ -23,7 +23,7 @@ impl Uniform {
     }
 }
 
-/// A smooth map that no affine map comes near.
+/// A smooth map that is far from every affine map.
 pub(crate) fn bend<const D: usize>(p: &Point<f64, D>) -> Point<f64, D> {
     Point::from(SVector::from_fn(|k, _| {
         p[k] + 0.2 * (2.0 * p[(k + 1) % D] + k as f64).sin()
@@ -42,7 +42,7 @@ pub(crate) fn fit<const D: usize, K: Kernel>(
     ThinPlateSpline::fit(sources, targets, options).expect("a spline")
 }
 
-/// Options with this smoothing and, where given, these weights.
+/// Options with this smoothing and, if given, these weights.
 pub(crate) fn options<K>(
     kernel: K,
     smoothing: Smoothing,
