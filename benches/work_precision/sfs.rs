@@ -3,8 +3,8 @@
 use crate::study::{Effort, Study};
 use ndarray::Array2;
 use tactile_imaging::sfs::{
-    BoundaryCondition, CosinePoisson, Domain, Eikonal, FrankotChellappa, Image, Lighting,
-    MaskedLeastSquares, PixelScalar, SlopeIntegrator, SurfaceReconstruction, TsaiShah,
+    BoundaryCondition, CosinePoisson, Domain, Eikonal, Image, Lighting, MaskedLeastSquares,
+    PixelScalar, SlopeIntegrator, SurfaceReconstruction, TsaiShah,
 };
 
 /// A field over the pixels of the square [−1, 1]².
@@ -101,7 +101,6 @@ pub(crate) fn slopes(study: &mut Study) {
     for shape in study.choose(quick, full) {
         integral::<f64>(study, "cosine Poisson", shape, true, &CosinePoisson);
         integral::<f32>(study, "cosine, f32", shape, false, &CosinePoisson);
-        integral::<f64>(study, "Frankot–Chellappa", shape, false, &FrankotChellappa);
         let method = MaskedLeastSquares::default();
         integral::<f64>(study, "least squares", shape, false, &method);
     }

@@ -11,8 +11,8 @@ use ndarray::{Array2, Zip};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use tactile_imaging::sfs::{
-    CosinePoisson, Domain, FrankotChellappa, MaskedLeastSquares, SlopeIntegrator, StopReason,
-    Surface, SurfaceWorkspace, slopes as slopes_of,
+    CosinePoisson, Domain, MaskedLeastSquares, SlopeIntegrator, StopReason, Surface,
+    SurfaceWorkspace, slopes as slopes_of,
 };
 
 /// The domain with a mask and known heights, where there are some.
@@ -65,7 +65,6 @@ pub(crate) struct IntegrateArguments {
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Integration {
     Poisson,
-    FrankotChellappa,
     LeastSquares,
 }
 
@@ -137,7 +136,6 @@ pub(crate) fn integrate(
     let domain = within(domain, &inside, &known);
     let integrator: Box<dyn SlopeIntegrator<f64>> = match method {
         Integration::Poisson => Box::new(CosinePoisson),
-        Integration::FrankotChellappa => Box::new(FrankotChellappa),
         Integration::LeastSquares => Box::new(MaskedLeastSquares::default()),
     };
     let (mut workspace, mut surface) = (SurfaceWorkspace::default(), Surface::default());

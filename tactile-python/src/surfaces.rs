@@ -11,9 +11,8 @@ use std::sync::{Arc, Mutex};
 use tactile_imaging as rust;
 use tactile_imaging::pipeline::{DarkContact, ReconstructionChoice, SurfaceInput};
 use tactile_imaging::sfs::{
-    BoundaryCondition, CosinePoisson, Domain, Eikonal, FrankotChellappa, Image, Lighting,
-    MaskedLeastSquares, SfsError, SlopeIntegrator, Surface, SurfaceReconstruction,
-    SurfaceWorkspace, TsaiShah,
+    BoundaryCondition, CosinePoisson, Domain, Eikonal, Image, Lighting, MaskedLeastSquares,
+    SfsError, SlopeIntegrator, Surface, SurfaceReconstruction, SurfaceWorkspace, TsaiShah,
 };
 
 /// Heights of a surface from one shaded image.
@@ -128,7 +127,7 @@ fn heights(
 /// pixel_size : float or (x, y)
 ///     Heights have its unit.
 /// method : str
-///     "poisson" (the default), "frankot-chellappa" or "least-squares" (the default with a mask).
+///     "poisson" (the default) or "least-squares" (the default with a mask).
 /// mask : (rows, columns) array of bool
 ///     True where there are heights.
 ///
@@ -158,12 +157,10 @@ pub(crate) fn integrate<'py>(
     };
     let integrator: Box<dyn SlopeIntegrator<f64> + Send + Sync> = match method.unwrap_or(default) {
         "poisson" => Box::new(CosinePoisson),
-        "frankot-chellappa" => Box::new(FrankotChellappa),
         "least-squares" => Box::new(MaskedLeastSquares::default()),
         other => {
             return Err(invalid(format!(
-                "method must be \"poisson\", \"frankot-chellappa\" or \"least-squares\", \
-                 found {other:?}"
+                "method must be \"poisson\" or \"least-squares\", found {other:?}"
             )));
         }
     };

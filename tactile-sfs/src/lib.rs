@@ -14,7 +14,6 @@
 //! - Eikonal, frontal light: $|\nabla z| = \sqrt{1/R^2 - 1}$. A few sweeps, O(N).
 //! - Slopes to heights, Poisson: $\Delta z = \partial p/\partial x + \partial q/\partial y$. By
 //!   cosine transform O(N log N), error $O(h^4)$.
-//! - Frankot–Chellappa: $\hat Z = -i (u \hat P + v \hat Q)/(u^2 + v^2)$, periodic. O(N log N).
 //! - Tsai–Shah: a damped Newton step $z - K f(z)$ on $f = R - n \cdot s$, pixel by pixel. O(N) per
 //!   iteration.
 //!
@@ -40,7 +39,7 @@ pub use binning::{BinnedContact, Binning};
 pub use domain::Domain;
 pub use error::SfsError;
 pub use image::{Frame, Image};
-pub use integrate::{CosinePoisson, FrankotChellappa, MaskedLeastSquares, SlopeIntegrator};
+pub use integrate::{CosinePoisson, MaskedLeastSquares, SlopeIntegrator};
 pub use lighting::Lighting;
 pub use reconstruct::{
     BoundaryCondition, DepthTable, Eikonal, EikonalBranch, SurfaceReconstruction, TsaiShah,

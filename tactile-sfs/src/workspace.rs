@@ -44,7 +44,6 @@ pub struct SurfaceWorkspace<T> {
     pub(crate) profile: crate::reconstruct::ProfileBuffers<T>,
     pub(crate) field: crate::reconstruct::FieldBuffers<T>,
     pub(crate) poisson: crate::integrate::PoissonBuffers,
-    pub(crate) fourier: crate::integrate::FourierBuffers,
     pub(crate) masked: crate::integrate::MaskedBuffers,
     pub(crate) points: crate::sample::SampleBuffers,
     callback: Option<Callback>,

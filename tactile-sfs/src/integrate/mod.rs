@@ -4,7 +4,6 @@
 //! size, the smallest eigenvalues of the equations are below the rounding errors of single
 //! precision.
 
-mod fourier;
 mod masked;
 mod poisson;
 
@@ -12,8 +11,6 @@ use std::ops::Deref;
 
 use ndarray::ArrayView2;
 
-pub(crate) use fourier::FourierBuffers;
-pub use fourier::FrankotChellappa;
 pub(crate) use masked::MaskedBuffers;
 pub use masked::MaskedLeastSquares;
 pub use poisson::CosinePoisson;
@@ -56,10 +53,11 @@ pub trait SlopeIntegrator<T: PixelScalar>: Send + Sync {
     /// ```
     /// use ndarray::Array2;
     /// use tactile_sfs::{
-    ///     CosinePoisson, Domain, FrankotChellappa, SlopeIntegrator, Surface, SurfaceWorkspace,
+    ///     CosinePoisson, Domain, MaskedLeastSquares, SlopeIntegrator, Surface, SurfaceWorkspace,
     /// };
     /// let (mut workspace, mut surface) = (SurfaceWorkspace::default(), Surface::default());
-    /// let methods: [&dyn SlopeIntegrator<f64>; 2] = [&CosinePoisson, &FrankotChellappa];
+    /// let masked = MaskedLeastSquares::default();
+    /// let methods: [&dyn SlopeIntegrator<f64>; 2] = [&CosinePoisson, &masked];
     /// let flat = Array2::zeros((16, 16));
     /// for method in methods {
     ///     method.integrate_with(

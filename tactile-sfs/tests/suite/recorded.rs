@@ -7,7 +7,7 @@
 use ndarray::Array2;
 use tactile_sfs::{
     BoundaryCondition, ControlPointSampler, CosinePoisson, Domain, Eikonal, EikonalBranch,
-    EquallySpaced, FrankotChellappa, Image, Lighting, MaskedLeastSquares, SlopeIntegrator, Surface,
+    EquallySpaced, Image, Lighting, MaskedLeastSquares, SlopeIntegrator, Surface,
     SurfaceReconstruction, TsaiShah, slopes,
 };
 use test_support::Answers;
@@ -90,13 +90,9 @@ fn integrators(answers: &mut Answers) {
     let whole = Domain::new([scene.pixel, 1.2 * scene.pixel]).expect("a size");
     let masked = whole.with_mask(disc.view());
     let poisson = CosinePoisson;
-    let fourier = FrankotChellappa;
     let squares = MaskedLeastSquares::default();
-    let methods: [(&str, &dyn SlopeIntegrator<f64>); 3] = [
-        ("poisson", &poisson),
-        ("frankot_chellappa", &fourier),
-        ("masked", &squares),
-    ];
+    let methods: [(&str, &dyn SlopeIntegrator<f64>); 2] =
+        [("poisson", &poisson), ("masked", &squares)];
     for (name, method) in methods {
         for (case, domain) in [
             ("whole", whole),

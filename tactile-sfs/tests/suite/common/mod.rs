@@ -89,7 +89,6 @@ pub fn reconstructions(
 pub fn integrators<T: PixelScalar>() -> Vec<(&'static str, Box<dyn SlopeIntegrator<T>>)> {
     vec![
         ("poisson", Box::new(CosinePoisson)),
-        ("frankot-chellappa", Box::new(FrankotChellappa)),
         ("least squares", Box::new(MaskedLeastSquares::default())),
     ]
 }
