@@ -42,6 +42,7 @@ impl DarkContact {
     pub const DEFAULT_THRESHOLD_GREY: f64 = 3.0;
 
     /// Creates the stage from a table of (darkness in grey levels, depth in metres), interpreted by
+    /// [`depth_table`](Self::depth_table).
     ///
     /// # Errors
     /// [`PipelineError::DepthTable`], and [`PipelineError::Setting`] for sizes that are not positive.
@@ -61,7 +62,7 @@ impl DarkContact {
     /// The table as a reconstruction, with zero depth outside the contact.
     ///
     /// No darkness means no depth. A table with the entry (0, 0) is used unchanged. In other
-    /// tables, depths are counted from a contact circle that was first visible at some darkness: if
+    /// tables, depths are counted from a contact circle that was first visible at some darkness. If
     /// the table determines its zero, it is [zeroed](DepthTable::zeroed), otherwise it is used
     /// unchanged. Negative entries and entries at or below the contact threshold are dropped.
     ///

@@ -14,8 +14,8 @@ const MOST_SLOPE: f64 = 0.5;
 /// Relative standard error at a/h = 1 because the pressure on thin layers is flatter. It is
 /// proportional to (a/h)².
 ///
-/// With these three constants, 95 of 100 intervals contain the truth compared with finite elements,
-/// for a/R up to 1.15 and a/h up to 1.4
+/// With these three constants, 95 of 100 intervals contain the value from finite elements. This was
+/// tested for a/R up to 1.15 and a/h up to 1.4
 /// (`PRESSES=48 cargo test --release --test suite depressions`).
 const THIN_LAYER_ERROR: f64 = 0.025;
 

@@ -19,8 +19,8 @@ use nalgebra::Matrix3;
 const PLOTTED_FRAMES: usize = 64;
 
 /// Error of the height of a surface from shading, in cells of its grid. This and the next constant
-/// were chosen on balls of 6 to 150 pixels, computed with finite elements: smaller values miss more
-/// of them (`SEEDS=6 cargo test --test suite heights -- --nocapture`).
+/// were chosen for balls of 6 to 150 pixels, computed with finite elements. With smaller values
+/// more of them fail (`SEEDS=6 cargo test --test suite heights -- --nocapture`).
 const CELL_ERROR: f64 = 0.3;
 
 /// Additional relative error for a contact of [`RIM_RADIUS_PX`] pixels. It decreases with the cube

@@ -287,6 +287,7 @@ impl Pipeline {
     /// The loads include the [object and the
     /// guide](crate::elasticity::modulus::LoadSeries::bodies). A result from contacts on a
     /// compliant guide that ignores the guide gets the caution
+    /// [`GuideIgnored`](crate::elasticity::modulus::Warning::GuideIgnored).
     ///
     /// ```
     /// use tactile_simulate::Trial;

@@ -209,6 +209,7 @@ impl<'a> Press<'a> {
 
     /// Adds a frame that is read whenever a stage needs it and is never kept, for presses that do
     /// not fit in memory. Returns its number. An error of `read` is a message and becomes
+    /// [`PipelineError::Unreadable`].
     ///
     /// ```
     /// use tactile_simulate::Trial;

@@ -106,7 +106,7 @@ pub struct FrameResult {
     /// has another shape.
     pub surface_apparent: bool,
     /// Indentation of the guide by a ball on the axis, in metres, by the law of the guide's layers.
-    /// See
+    /// See [`Press::guide_depression_m`](super::Press::guide_depression_m).
     pub guide_depression_m: Option<Estimate>,
 }
 

@@ -3,8 +3,8 @@
 //! The first frames without contact make the reference. Then each frame gives its contact and
 //! force, and each contact refines the modulus. Shear is followed if the stiffnesses are known, and
 //! drift of the light is monitored in frames without contact. Strain is followed on request
-//! ([`Session::strain`]), from the load of the first request: the surface, points and spline of
-//! that load are kept, and each match starts from the last answer. Memory is constant, because
+//! ([`Session::strain`]), from the load of the first request. The surface, points and spline of
+//! that load are kept, and each match starts from the last result. Memory is constant, because
 //! similar loads are merged. [`Session::push`] and, with the default stages, [`Session::strain`]
 //! allocate nothing once their buffers have grown.
 use super::contact::{ContactReading, FrameContact, resize};

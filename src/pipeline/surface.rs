@@ -171,8 +171,9 @@ fn ceiling(input: SurfaceInput) -> f64 {
     }
 }
 
-/// Blocks around a contact on which its surface depends, in addition to those reached by smoothing:
-/// a ring of up to three over which the profile is extrapolated, and one of known height.
+/// Number of blocks around a contact on which its surface depends, in addition to those reached by
+/// smoothing. The profile is extrapolated over a ring of up to three blocks, and one has a known
+/// height.
 const AROUND: usize = 4;
 
 /// The part of a contact's region on which its surface depends, in the same blocks, because

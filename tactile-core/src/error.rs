@@ -7,7 +7,7 @@ use std::sync::Arc;
 /// The failure of a user-defined stage, as part of the error types of the workspace.
 ///
 /// It is cheap to clone, and two failures are equal if their messages are. It is transparent in a
-/// chain of sources: its message and its source are those of the user's error.
+/// chain of sources: it has the message and the source of the user's error.
 ///
 /// ```
 /// use std::error::Error;

@@ -68,9 +68,9 @@ pub fn median(values: &mut [f64]) -> f64 {
 /// t = Σ vᵢ t(νᵢ)/Σ vᵢ (Cochran and Cox, Experimental Designs, 2nd ed. 1957, §4.14). `None` if all
 /// variances are known.
 ///
-/// With the usual rule of Welch and Satterthwaite, 95 % intervals contain the true value in 87 to
-/// 93 % of cases if a variance with one degree of freedom is added to a known one. With this rule
-/// it is 94 to 98 %. Quantiles are interpolated to 1 %.
+/// If a variance with one degree of freedom is added to a known one, 95 % intervals by the usual
+/// rule of Welch and Satterthwaite contain the true value in 87 to 93 % of cases. With this rule it
+/// is 94 to 98 %. Quantiles are interpolated to 1 %.
 ///
 /// ```
 /// use tactile_core::statistics::{effective_degrees_of_freedom, quantile_95};

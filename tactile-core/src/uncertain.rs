@@ -174,9 +174,9 @@ impl Uncertain {
         Self::exact(estimate.value).by_estimated(source, error, degrees)
     }
 
-    /// Adds a standard deviation from a source. Its sign is that of the change of the value with a
-    /// positive error of the source. If there is already a part of the same source, the two are
-    /// independent: their squares add up.
+    /// Adds a standard deviation from a source. It is positive if a positive error of the source
+    /// increases the value. If there is already a part of the same source, the two are independent:
+    /// their squares add up.
     #[must_use]
     pub fn by(self, source: Source, standard_deviation: f64) -> Self {
         self.by_estimated(source, standard_deviation, None)

@@ -14,7 +14,7 @@ const UNKNOWN_STEP: f64 = 1e-3;
 /// not span.
 ///
 /// In the plane nothing changes along z: H has zeros there, the ratio is of areas, and the
-/// equivalent strain is that of plane strain.
+/// equivalent strain assumes plane strain.
 ///
 /// ```
 /// use nalgebra::Matrix3;
@@ -74,8 +74,8 @@ struct Followers {
 
 impl StrainQuantities {
     /// Computes the quantities from a displacement gradient. Each of its rows has this covariance,
-    /// and the rows are independent. `axes` is 2 in the plane and 3 in space. Strains are those of
-    /// `measure`.
+    /// and the rows are independent. `axes` is 2 in the plane and 3 in space. Strains are computed
+    /// by `measure`.
     ///
     /// # Errors
     /// Those of [`StrainMeasure::of`].

@@ -104,9 +104,9 @@ pub enum TimeDependence {
         /// Relative change of the gain per second.
         per_s: Estimate,
     },
-    /// The moduli change with time for an undetermined reason: there are too few loads, the moduli
-    /// fall in proportion to time (a falling gain, or a time constant longer than the series), or
-    /// neither model explains the change.
+    /// The moduli change with time for an undetermined reason. Either there are too few loads, or
+    /// the moduli fall in proportion to time (a falling gain, or a time constant longer than the
+    /// series), or neither model explains the change.
     Undecided {
         /// Relative change from the first load to the last.
         change: f64,
@@ -181,9 +181,8 @@ const STRONG_EVIDENCE: f64 = 6.0;
 /// order of time.
 ///
 /// `scale_error` is the relative standard error common to all moduli, which widens the intervals of
-/// E₀ and E∞. `law_error` is the relative error of the law behind the moduli: it is the assumed
-/// difference between loads that differ by a factor of e, so that an increasing load is not
-/// mistaken for an effect of time.
+/// E₀ and E∞. `law_error` is the relative error of the law behind the moduli, for loads that differ
+/// by a factor of e. It prevents an increasing load from being mistaken for an effect of time.
 ///
 /// Five loads at different times are needed. With fewer, only a significant trend is reported, as
 /// [`TimeDependence::Undecided`]. A solid is reported if the likelihood ratio against a constant

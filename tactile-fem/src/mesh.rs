@@ -1,5 +1,5 @@
-//! Meshes of nine-node quadrilaterals in the half plane (r, z): mapped meshes of the bodies that
-//! touch a sensor, and of a tissue block with a spherical inclusion under the flat face of a guide.
+//! Mapped meshes of nine-node quadrilaterals in the half plane (r, z), for bodies that touch a
+//! sensor, and for a tissue block with a spherical inclusion under the flat face of a guide.
 
 use crate::spacing::{arc_fractions, graded, graded_up_to, grow, with_middles};
 use std::collections::BTreeMap;
@@ -16,9 +16,9 @@ const CORNER_ROOM: f64 = 0.05;
 const SLIDING_FINENESS: f64 = 5.0;
 
 /// Shortest element at the rim of a sliding face, relative to the face radius. Shared displacements
-/// are less and less valid for finer elements as the face sinks in: elements of 0.02 are inverted
-/// at a tenth of the block's height, and the pressure within three quarters of the face jumps by 1
-/// %. Until then it agrees with that of finer elements within 0.05 %.
+/// become less valid for finer elements as the face sinks in. Elements of 0.02 are inverted at a
+/// tenth of the block's height, and the pressure within three quarters of the face jumps by 1 %.
+/// Until then it agrees with that of finer elements within 0.05 %.
 const SLIDING_RIM: f64 = 0.045;
 
 /// Parts of a body's boundary to which conditions and contact refer.

@@ -156,8 +156,8 @@ impl Solver<'_> {
         reached && self.advance(load) && self.augment(load)
     }
 
-    /// Goes towards an approach, which may change on the way, in steps suitable for two deformable
-    /// surfaces or for sticking surfaces: a contact that grows manyfold in one step does not
+    /// Moves to an approach, which may change on the way, in steps suitable for two deformable
+    /// surfaces or for sticking surfaces. If a contact grows manyfold in one step, it does not
     /// converge, or slides although it should stick.
     fn walk(&mut self, target: impl Fn(&Self) -> f64) -> bool {
         let (growth, first_part) = match (self.model.sticks, self.slides()) {

@@ -203,7 +203,7 @@ pub struct ObjectPress {
 }
 
 /// Number of elements across the core of a contact, 0.06 radii of a ball. With five, the contact
-/// radius of a ball on a flat is within 0.2 % from a/R = 0.15 on; ten take four times as long
+/// radius of a ball on a flat is accurate to 0.2 % from a/R = 0.15 on. Ten take four times as long
 /// (`cargo bench -p tactile-benches --features fem --bench finite_elements`).
 const FINENESS: usize = 5;
 

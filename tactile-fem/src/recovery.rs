@@ -3,8 +3,8 @@
 //! Pressures of neighbouring nodes, the ends and midpoints of quadratic edges, alternate about the
 //! true pressure, by several per cent near the edge of the contact. Weighted by the hat functions
 //! of the edges' ends, which are possible displacements of the elements, the forces are in
-//! equilibrium with the bodies and do not alternate: they are means of the true pressure, whose
-//! squares lie nearly on a straight line over r².
+//! equilibrium with the bodies and do not alternate. They are means of the true pressure, whose
+//! square is nearly linear in r².
 //!
 //! The pressures of a state come from the multipliers of a contact, or from the element forces at a
 //! bonded interface.

@@ -354,8 +354,8 @@ pub struct Solution {
 
 impl FemScene {
     /// A cylinder between two rigid plates, to which both faces stick or on which they slide
-    /// without friction. One half is solved, because the other is its mirror image. The approach is
-    /// that of one plate to the middle, half of the total compression.
+    /// without friction. One half is solved, because the other is its mirror image. The approach of
+    /// one plate to the middle, half of the total compression.
     ///
     /// The [pressure](crate::State::pressure) is that on the face. With sliding it is uniform, and
     /// the state is homogeneous. With sticking, the sides bulge, and the pressure depends on the

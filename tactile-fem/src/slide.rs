@@ -2,7 +2,7 @@
 //!
 //! With [`ElementModel::slide`](crate::model::ElementModel::slide), coincident nodes share their
 //! axial displacement. Because the bodies spread by different amounts, such nodes separate sideways
-//! by several tenths of a millimetre, which changes the pressure by up to 1.1 % at a tenth of the
+//! by several tenths of a millimetre. This changes the pressure by up to 1.1 % at a tenth of the
 //! block's height. The mesh of the upper body is therefore moved along its surface until nodes that
 //! share a displacement coincide in the deformed state.
 //!
@@ -10,7 +10,7 @@
 //! neglected. CalculiX with faces tied in the same way agrees (`evidence/inclusion_scenes.py`, the
 //! test `inclusion::against_calculix`). With contact pairs, whose pressure is normal to the bent
 //! face, CalculiX's forces and pressures are lower by 0.3 % at a thirtieth of the block's height
-//! and by about 2 % at a tenth, which the search does not take into account.
+//! and by about 2 % at a tenth. The search does not take this into account.
 
 use crate::model::ElementModel;
 use crate::scene::{AppliedLoad, FemScene};
@@ -22,8 +22,8 @@ use crate::system::Layout;
 const RIM_MET: f64 = 5e-5;
 
 /// Fraction of the face radius above which nodes belong to the rim, with their own tolerance. At a
-/// tenth of the block's height a round leaves half of their distance instead of a tenth, and the
-/// pressure within three quarters of the face changes by a hundredth of it.
+/// tenth of the block's height half of their distance remains after a round instead of a tenth. The
+/// pressure within three quarters of the face then changes by a hundredth of it.
 const RIM_LIMIT: f64 = 0.9;
 
 /// Distance at which nodes count as coincident, relative to the face radius. Pressures change by

@@ -4,10 +4,10 @@
 //! A contact node that carries a pressure after a load step is anchored to the point opposite to
 //! it. Let d be its displacement relative to that point since then, and t the direction of the
 //! surface. The traction τ = ε t·d per reference area holds it back, with the penalty ε of the
-//! normal pressure. It derives from the potential ½ ε (t·d)². The direction t is that of the last
-//! load step, so the potential is quadratic and its tangent symmetric. A node whose pressure has
-//! ended becomes free only after the load step: otherwise Newton's method would switch it between
-//! the two states.
+//! normal pressure. It derives from the potential ½ ε (t·d)². The direction t is taken from the
+//! last load step, so the potential is quadratic and its tangent symmetric. A node whose pressure
+//! has ended becomes free only after the load step: otherwise Newton's method would switch it
+//! between the two states.
 //!
 //! A node that comes into contact within a load step does so on average in its middle. It is
 //! anchored to the mean of its relative displacements before and after the step. Nodes that touch

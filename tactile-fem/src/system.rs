@@ -304,7 +304,7 @@ impl Tangent {
 
 /// Residual and tangent at one state.
 ///
-/// Contact enters each Newton iteration as a linear complementarity problem: gaps are linear in the
+/// Contact is a linear complementarity problem in each Newton iteration. Gaps are linear in the
 /// step, and the set of contact nodes is found for the step (primal–dual active set) rather than
 /// for the state before it.
 pub(crate) struct System<'a> {

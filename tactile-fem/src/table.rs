@@ -8,7 +8,7 @@ use tactile_elasticity::laws::{ContactLaw, ContactLength, WaveguideLaw};
 use tactile_elasticity::{ElasticityError, Quantity};
 
 /// If the force has grown with a higher power of the radius than this since the previous contact,
-/// the contact is the last of its curve: the ball has sunk in to its equator. Polynomials that
+/// the ball has sunk in to its equator, and the contact is the last of its curve. Polynomials that
 /// follow the bend there would have errors of 2 % of the force everywhere instead of 0.6 %.
 const STEEPEST: f64 = 6.0;
 

@@ -5,8 +5,8 @@ use thiserror::Error;
 
 /// Why an input was rejected.
 ///
-/// The absence of contact is a value, a fit that does not converge is a report, and a calibration
-/// used outside its range is a flag: none of these is an error.
+/// Three results are not errors: the absence of contact is a value, a fit that does not converge is
+/// a report, and a calibration used outside its range is a flag.
 ///
 /// ```
 /// use ndarray::Array2;

@@ -55,7 +55,7 @@ impl FlatLine {
 
 impl FlatField {
     /// Fits the flat field. `None` if the reference is black or has too few tiles for six
-    /// coefficients. `variance` is that of one pixel of the reference.
+    /// coefficients. `variance` refers to one pixel of the reference.
     pub(crate) fn fit(
         (rows, columns): (usize, usize),
         tiles: impl Iterator<Item = TileSum>,

@@ -184,7 +184,7 @@ impl LensGeometry {
     }
 
     /// Undistorted centre [X, Y] and radius, in metres, of a contact that appears as a circle of
-    /// `radius_px` pixel widths, for pixels `aspect` times as high as wide. The radius is that of a
+    /// `radius_px` pixel widths, for pixels `aspect` times as high as wide. The radius belongs to a
     /// circle with the area of the undistorted contour.
     pub(crate) fn contact_m(
         &self,

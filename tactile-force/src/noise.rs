@@ -7,9 +7,9 @@ use crate::error::ForceError;
 
 /// Variance of one pixel of one frame: read variance + gain × grey level, in squared grey levels.
 ///
-/// The read variance includes the 1/12 of rounding to integer grey levels. The gain is that of the
-/// camera, in grey levels per photoelectron: the variance of the shot noise at a grey level g is
-/// gain × g.
+/// The read variance includes the 1/12 of rounding to integer grey levels. The gain of the camera
+/// is in grey levels per photoelectron: the variance of the shot noise at a grey level g is gain ×
+/// g.
 ///
 /// ```
 /// use ndarray::Array2;

@@ -378,8 +378,8 @@ pub(crate) fn gain(
     ((trimmed_variance(seen) / 36.0 - background) * count as f64 / signal).max(0.0)
 }
 
-/// Every n-th number of a range, counted from its middle to both sides: the rows and columns of a
-/// contact are then the same if the image is mirrored, rotated or shifted.
+/// Every n-th number of a range, counted from its middle to both sides. The selected rows and
+/// columns of a contact therefore do not change if the image is mirrored, rotated or shifted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EveryNth {
     /// The middle of the range, rounded down and up.

@@ -205,9 +205,9 @@ impl Sums {
 impl GelSensor {
     /// Calibrates a sensor from its frame without contact and at least three presses of balls.
     ///
-    /// Circles and polynomial are determined alternately: the polynomial from the circles by ridge
-    /// regression, and the circles from the contacts in its normals, until no circle changes by a
-    /// tenth of a pixel. Without drawn circles, the start is the region of large colour
+    /// Circles and polynomial are determined alternately until no circle changes by a tenth of a
+    /// pixel. The polynomial follows from the circles by ridge regression, and the circles from the
+    /// contacts in its normals. Without drawn circles, the start is the region of large colour
     /// differences.
     ///
     /// A circle drawn by hand may be off by several pixels. The median offset between drawn and
@@ -215,7 +215,7 @@ impl GelSensor {
     /// this offset, the found circles are used. A drawn circle is wrong if it is off by more than
     /// three times the median misfit and more than a tenth of the ball's radius.
     ///
-    /// Errors come from leaving out one press at a time: they are the 68.3 % quantile of the
+    /// Errors come from leaving out one press at a time. They are the 68.3 % quantile of the
     /// differences to the ball in the circle, which is the drawn one unless it is wrong. The common
     /// error of all slopes comes from the scatter of the presses, by Student's distribution for few
     /// presses.

@@ -3,9 +3,9 @@
 //! The pressure follows from the slopes by the linear law of the face ([`Plane`]). Outside a
 //! contact it vanishes. At the edge of a smooth object the face leaves it without a kink, and the
 //! pressure ends as √(distance to the edge). The mean pressure at each distance from the
-//! half-height contour of a region is fitted with this root, blurred like the frame, so that
-//! neither blur nor threshold shifts the edge. If the root does not fit, the face has a kink (a
-//! sharp rim or steep walls), and the edge is at the largest slope.
+//! half-height contour of a region is fitted with this root, blurred like the frame. Neither blur
+//! nor threshold therefore shifts the edge. If the root does not fit, the face has a kink (a sharp
+//! rim or steep walls), and the edge is at the largest slope.
 
 use ndarray::{Array2, ArrayView2, Zip};
 use tactile_core::BoundingBox;

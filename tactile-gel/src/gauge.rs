@@ -124,7 +124,7 @@ impl GaugeForce {
 
     /// The force in newtons under a volume in cubic metres.
     ///
-    /// The error is that of one more reading: the scatter of the readings plus the error of the
+    /// The error applies to one more reading: the scatter of the readings plus the error of the
     /// line. It is infinite for volumes outside the range of the readings by more than half.
     pub fn at_volume(&self, volume_m3: f64) -> Estimate {
         let away = volume_m3.ln() - self.mean[0];

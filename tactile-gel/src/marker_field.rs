@@ -316,13 +316,14 @@ impl MarkerField {
     }
 
     /// Shear force and torque of a gel whose surface resists displacement by k Pa per metre: F = k
-    /// A Σ u and M = k A Σ (r × u) over the cells of all markers of the reference, with the area A
-    /// of a cell. Hidden markers move like those around them, with a corresponding error.
+    /// A Σ u and M = k A Σ (r × u). The sums are over the cells of all markers of the reference,
+    /// with the area A of a cell. Hidden markers move like those around them, with a corresponding
+    /// error.
     ///
     /// A layer of shear modulus G and thickness h bonded to a rigid plate has k = G/h. For the
     /// whole face this holds for contacts of any width, because only the longest wave carries a net
-    /// force. Errors are those of the markers, not of k. `None` without three markers that are not
-    /// on a line.
+    /// force. Errors include those of the markers, but not of k. `None` without three markers that
+    /// are not on a line.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -372,7 +373,7 @@ impl MarkerField {
     /// Number of markers under a contact that have left its rigid motion since an earlier frame.
     /// `covers` is true for positions (in pixels) inside the contact.
     ///
-    /// Markers that stick to a rigid body move rigidly. The motion is that of the majority: if more
+    /// Markers that stick to a rigid body move rigidly. The majority determines the motion: if more
     /// than half of the markers slip, it is theirs, and a contact that slips as a whole shows no
     /// slip. A marker slips if it deviates by four standard errors and a third of a pixel. `None`
     /// for fewer than four visible markers inside the contact in both frames.

@@ -1,10 +1,10 @@
 //! The rest level of the face: the level far away, outside the frame.
 //!
 //! Along the border the face is not at rest. A point force displaces the free face of a half-space
-//! by f dA/2πr, with f = 2p/E*, and that of a bonded layer of thickness h by f dA g(r/h)/h, which
-//! decays sooner and changes its sign. The free face in a frame may or may not reveal the thickness
-//! of the gel: the level is the mean over likely thicknesses, and their scatter is part of its
-//! error.
+//! by f dA/2πr, with f = 2p/E*. On a bonded layer of thickness h the displacement is f dA g(r/h)/h,
+//! which decays sooner and changes its sign. The free face in a frame may not determine the
+//! thickness of the gel. The level is therefore the mean over likely thicknesses, and their scatter
+//! is part of its error.
 
 use ndarray::Array2;
 
@@ -266,8 +266,8 @@ impl Level {
 mod tests {
     use super::*;
 
-    /// At a small distance a layer acts as a half-space. Its mean displacement is that of the
-    /// longest wave: 4(κ − 1)/(1 + κ)² thicknesses.
+    /// At a small distance a layer acts as a half-space. The longest wave gives its mean
+    /// displacement: 4(κ − 1)/(1 + κ)² thicknesses.
     #[test]
     fn tails_of_layers_begin_as_those_of_half_spaces() {
         let tails = LayerTail::new();

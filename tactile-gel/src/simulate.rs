@@ -12,8 +12,8 @@ use crate::plane::bessel_j0;
 ///
 /// The level of a channel is ambient + brightness · fall-off · max(n·l, 0) · gain plus noise, in
 /// eight bits. Lamps are 120° apart at `elevation` above the face, and their light decreases
-/// linearly across the frame. A face that points away from a lamp gets none of its light. Shadows
-/// and reflections from other walls are neglected.
+/// linearly across the frame. A face that points away from a lamp is not lit by it. Shadows and
+/// reflections from other walls are neglected.
 ///
 /// ```
 /// use tactile_gel::simulate::{ColourGel, GelObject};

@@ -62,7 +62,7 @@ const BONDED: ModelErrors = ModelErrors {
 
 /// Comparison without friction: all pressures are 0.05 to 0.25 % low. The shape agrees within 0.1 %
 /// and is low towards the rim by up to 0.2 % in soft tissue, and by 0.85 % in tissue a third as
-/// stiff as the guide; over eight blocks of `evidence/inclusion_scenes.py` the root mean square is
+/// stiff as the guide. Over eight blocks of `evidence/inclusion_scenes.py` the root mean square is
 /// 0.5 %. Four fifths of this disappear if CalculiX's elements at the rim are a quarter as long,
 /// but the data were not computed in that way. On the axis above a shallow inclusion the difference
 /// is up to 0.4 %, and forces are 0.2 to 1.3 % low. The growing part is 0.1 to 0.25 % at the
@@ -167,7 +167,8 @@ pub(crate) struct ObservedCells {
 const ASIDE: f64 = 0.034;
 
 /// Error of the pressure on a whole face on the scale of the elements, in addition to that of
-/// rings: another code's solutions of plain blocks in three dimensions scatter by 0.12 to 0.25 %.
+/// rings. Solutions of plain blocks in three dimensions by another program scatter by 0.12 to 0.25
+/// %.
 const ROUGH_PICTURE: f64 = 2e-3;
 
 /// Standard error of the angle between face and block, in radians: two degrees.

@@ -5,9 +5,9 @@ use tactile_fem::Interface;
 
 /// Relative standard error above which a parameter is not identified. The longer side of its
 /// interval counts: a modulus that may be far higher is not identified by a lower bound. In 162
-/// scenes of `evidence/inclusion_scenes.py`, none of the 60 parameters that a sensor cannot
-/// determine within 30 % was reported as identified (`inclusion_study`). In exchange, some that it
-/// could determine within 20 to 30 % stay open.
+/// scenes of `evidence/inclusion_scenes.py`, 60 parameters cannot be determined by a sensor within
+/// 30 %, and all 60 were correctly reported as not identified (`inclusion_study`). In exchange,
+/// some that it could determine within 20 to 30 % stay open.
 const OPEN: f64 = 0.25;
 
 /// An asymmetry of 1 % is harmless, 6 % is not.
@@ -40,7 +40,7 @@ pub struct Estimated {
 
 impl Estimated {
     /// Creates the estimate from a logarithm and the ends of its 95 % interval. The standard error
-    /// is that of a Gaussian with an interval of equal width.
+    /// belongs to a Gaussian with an interval of equal width.
     pub(crate) fn within(logarithm: f64, [low, high]: [f64; 2]) -> Self {
         let value = logarithm.exp();
         Self {
@@ -195,9 +195,9 @@ pub enum InclusionWarning {
     OneFrame,
     /// The fit stopped before it converged.
     NotConverged,
-    /// Bonded and frictionless faces fit the frames about equally well: the values are those of the
-    /// better one, and the intervals cover both. If one of them could not be solved, no parameter
-    /// is identified.
+    /// Bonded and frictionless faces fit the frames about equally well: the better one gives the
+    /// values, and the intervals cover both. If one of them could not be solved, no parameter is
+    /// identified.
     UncertainInterface,
     /// The inclusion is closer to the surface or to the stage than half an element, where the model
     /// does not apply.
@@ -323,9 +323,9 @@ pub enum SearchVerdict {
 pub struct InclusionEstimate {
     /// Probability that there is an inclusion, with a prior probability of one half.
     pub probability: f64,
-    /// Whether an inclusion was found: its probability is above 0.99, χ² falls by more than 36, its
-    /// modulus differs from the tissue's by at least a fifth, it lies within the block, and χ² over
-    /// its degrees of freedom is below 50.
+    /// Whether an inclusion was found. Its probability is above 0.99, it reduces χ² by more than
+    /// 36, and its modulus differs from that of the tissue by at least a fifth. It lies within the
+    /// block, and χ² over its degrees of freedom is below 50.
     pub found: bool,
     /// Young's modulus of the tissue, in pascals.
     pub block_modulus_pa: Estimated,

@@ -12,8 +12,8 @@ use tactile_fem::{
 /// Maximum change of the logarithm of a length by which a mesh is moved.
 const LARGEST_MESH_CHANGE: f64 = 0.3;
 
-/// Motion of the points of the block: the inclusion moves as an ellipse with growing axes, the far
-/// side moves with the height, the face does not move, and between them the motion is linear.
+/// Motion of the points of the block. The inclusion moves as an ellipse with growing axes, the far
+/// side moves with the height, and the face does not move. Between them the motion is linear.
 struct MeshMotion {
     /// Half axes of the inclusion across and along the axis. Zero without an inclusion.
     half_axes: [f64; 2],

@@ -117,7 +117,7 @@ impl Hypothesis {
         (self.better().misfit / observed.values.len() as f64).max(1.0)
     }
 
-    /// Log-evidence with an inclusion. If none was fitted, it is that of the grid.
+    /// Log-evidence with an inclusion. Without a fit, it comes from the grid.
     fn evidence_with(&self) -> f64 {
         match (&self.lump, &self.score) {
             (Some(fit), _) => fit.evidence + self.marginal.as_ref().map_or(0.0, |m| m.gain),

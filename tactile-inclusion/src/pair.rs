@@ -1,6 +1,6 @@
 //! Two inclusions, if one does not explain the pressure.
 //!
-//! The pressure is that of a plain block times the ratios of both inclusions,
+//! The pressure is the product of that of a plain block and the ratios of both inclusions,
 //!
 //! $$ p = p_\mathrm{plain} \prod_k \frac{p_k}{p_\mathrm{plain}} $$
 //!

@@ -3,9 +3,9 @@
 //!
 //! A stiff inclusion hardly changes the pressure if it becomes stiffer, and a small stiff one is
 //! hardly different from a large one that is slightly stiffer than the tissue. Along such a ridge
-//! the posterior density falls neither fast nor evenly, and the curvature at its maximum says
-//! little about its length. With u = ln E₁, θ all other coordinates, F the objective of the fit (−2
-//! ln of the posterior), θ(u) its minimum at given u and M(u) its curvature there in θ,
+//! the posterior density falls neither fast nor evenly, and its length cannot be derived from the
+//! curvature at the maximum. With u = ln E₁, θ all other coordinates, F the objective of the fit
+//! (−2 ln of the posterior), θ(u) its minimum at given u and M(u) its curvature there in θ,
 //!
 //! $$ p(u) \propto |M(u)|^{-1/2} \exp(-F(u, \theta(u)) / 2) $$
 //!

@@ -209,8 +209,8 @@ impl InclusionSearch {
     ///
     /// Only positions under the used part of a press's face are searched. The result has two
     /// inclusions if a single one does not fit within the errors and two do. The time grows with
-    /// the third power of the number of cells: a fifteenth of the face radius resolves what a
-    /// single press shows, and an eighth is narrow enough for five presses. The force is not used.
+    /// the third power of the number of cells. A fifteenth of the face radius resolves the pressure
+    /// of a single press, and an eighth is narrow enough for five presses. The force is not used.
     ///
     /// # Errors
     /// Those of [`Self::search_with_progress`], and errors if there is no press, approaches differ

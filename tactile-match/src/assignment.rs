@@ -1,8 +1,8 @@
 //! Linear assignment: pairs rows with columns at the least total cost.
 //!
 //! Given costs `c_ij` of `n` rows and `m` columns, choose distinct columns `j(i)` that minimise
-//! `Σ c_i,j(i)`. If the matrix is not square, `min(n, m)` rows get a column. The method is that of
-//! Jonker and Volgenant (Computing 38, 325–340, 1987) in its rectangular form: augmenting row
+//! `Σ c_i,j(i)`. If the matrix is not square, `min(n, m)` rows get a column. This is the method of
+//! Jonker and Volgenant (Computing 38, 325–340, 1987) in its rectangular form. Augmenting row
 //! reduction assigns most rows, and shortest augmenting paths (Dijkstra's algorithm on the reduced
 //! costs `c_ij − u_i − v_j ≥ 0`) assign the rest. The worst case is `O(min(n, m)² max(n, m))`;
 //! point sets take close to `O(n m)`.

@@ -14,7 +14,7 @@
 //! The motion is `T(y) = y + Σ_k w_k exp(−|y − y_k|²/2β²)`, so neighbours move coherently. All
 //! parameters refer to sets scaled to a root mean square radius of one ([`Normalization`]), so a
 //! setting means the same in every unit. The implementation differs from the usual programs in two
-//! ways that do not change the result: `P` is never stored during the iterations, and the Gaussian
+//! ways that do not change the result. `P` is never stored during the iterations, and the Gaussian
 //! kernel is factorised once, to its numerical rank, instead of solving an `M × M` system in every
 //! iteration.
 

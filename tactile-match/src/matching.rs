@@ -314,8 +314,8 @@ impl<const D: usize> Matching<D> {
     /// The warp is a thin-plate spline smoothed by cross-validation if there are at least three
     /// times as many pairs as coefficients of an affine map along an axis. With fewer pairs it is
     /// an affine map, and with D or fewer a rigid motion. Pairs are weighted by their confidences.
-    /// The covariance of each warped point is that of the weighted residuals of the pairs. Model
-    /// points without a pair have confidence zero. O(n³) for up to 3000 pairs.
+    /// The covariance of each warped point is estimated from the weighted residuals of the pairs.
+    /// Model points without a pair have confidence zero. O(n³) for up to 3000 pairs.
     ///
     /// ```
     /// use nalgebra::Point2;

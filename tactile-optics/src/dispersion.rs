@@ -48,13 +48,13 @@ impl Dispersion {
         range_m: [0.40e-6, 0.75e-6],
     };
     /// PDMS (Dow Corning), 10:1: 1.3950 at 589 nm, with a residual sd of 2.4×10⁻⁴ and a maximum of
-    /// 4.6×10⁻⁴. The source is that of [`PDMS_5_1`](Self::PDMS_5_1).
+    /// 4.6×10⁻⁴. For the source see [`PDMS_5_1`](Self::PDMS_5_1).
     pub const PDMS_10_1: Self = Self::Cauchy {
         coefficients: [1.384091, 3.7890e-3, 0.0],
         range_m: [0.40e-6, 0.75e-6],
     };
     /// PDMS (Dow Corning), 20:1: 1.4073 at 589 nm, with a residual sd of 1.6×10⁻⁴ and a maximum of
-    /// 3.8×10⁻⁴. The source is that of [`PDMS_5_1`](Self::PDMS_5_1).
+    /// 3.8×10⁻⁴. For the source see [`PDMS_5_1`](Self::PDMS_5_1).
     pub const PDMS_20_1: Self = Self::Cauchy {
         coefficients: [1.395397, 4.1179e-3, 0.0],
         range_m: [0.40e-6, 0.75e-6],

@@ -418,10 +418,9 @@ impl Tally {
 
 /// Follows the stronger part of one ray and writes its vertices (x, y, z in metres, z from the
 /// undeformed top) to `vertices`. Returns the number of vertices. The ray enters the edge x = 0 in
-/// the plane y = 0 at the fraction `depth_share` of the slab's thickness, at `angle` radians
-/// upwards from the axis of the LED. It ends at an edge, at the point at which most of its light
-/// leaves through top or bottom, or when `vertices` is full.
-/// `vertices` is full.
+/// the plane y = 0, at the fraction `depth_share` of the slab's thickness. Its direction is `angle`
+/// radians upwards from the axis of the LED. It ends at an edge, at the point at which most of its
+/// light leaves through top or bottom, or when `vertices` is full. `vertices` is full.
 ///
 /// # Errors
 /// [`OpticsError::OutOfRange`] for a fraction outside 0 to 1, an angle beyond a right angle, or a

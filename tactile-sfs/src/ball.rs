@@ -67,7 +67,7 @@ impl BallFit {
     /// Fits a ball and its radius: the radius with the least mean absolute error.
     ///
     /// The best of 60 radii, from half the width of the heights to a hundred times that, is refined
-    /// by a golden-section search between its neighbours. The cost is that of 120 fits with a known
+    /// by a golden-section search between its neighbours. The cost equals 120 fits with a known
     /// radius. `None` under the conditions of [`of_radius`](Self::of_radius).
     pub fn of_any_radius(heights: ArrayView2<'_, f64>, domain: &Domain<'_, f64>) -> Option<Self> {
         let pixels = pixels(heights, domain)?;

@@ -1,8 +1,8 @@
 //! Surfaces from a single image, on a [`Domain`] (mask, pixel size, known heights).
 //!
 //! Images are indexed `[row, column]`. The axis x runs along columns, y along rows, and z points to
-//! the viewer. Coordinates of a pixel are those of its centre. Slopes are p = ∂z/∂x and q = ∂z/∂y.
-//! See [`Lighting`] for the sign of the direction of the light.
+//! the viewer. Coordinates of a pixel refer to its centre. Slopes are p = ∂z/∂x and q = ∂z/∂y. See
+//! [`Lighting`] for the sign of the direction of the light.
 //!
 #![doc = include_str!("../README.md")]
 //!

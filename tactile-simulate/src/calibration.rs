@@ -40,9 +40,9 @@ pub struct CalibrationRun {
     pub steps: usize,
     /// Standard deviation of the gauge reading in newtons.
     pub gauge_noise_n: f64,
-    /// Hysteresis h. During unloading the light is that of a larger force F + 4·h·F_max·x(1 − x),
-    /// with x = F/F_max: h is the largest difference between the branches as a fraction of the
-    /// range. The paper found none.
+    /// Hysteresis h. During unloading the light corresponds to a larger force F + 4·h·F_max·x(1 −
+    /// x), with x = F/F_max. Here h is the largest difference between the branches as a fraction of
+    /// the range. The paper found none.
     pub hysteresis: f64,
 }
 

@@ -252,8 +252,8 @@ pub enum ContactModel {
     #[default]
     Hertz,
     /// Tatara (1991), first extension of Hertz to a sphere compressed between two surfaces. Radius
-    /// and pressure are Hertz's, but the approach is reduced by the displacement due to the force
-    /// of the opposite contact: δ = a²/R − F/(πE₁)·[(1 − ν₁²)/√(a² + 4R²) + 2(1 + ν₁)R²/(a² +
+    /// and pressure are Hertz's. The approach is reduced by the displacement due to the force of
+    /// the opposite contact: δ = a²/R − F/(πE₁)·[(1 − ν₁²)/√(a² + 4R²) + 2(1 + ν₁)R²/(a² +
     /// 4R²)^{3/2}]. Only the sphere's material (E₁, ν₁) enters the correction, because the
     /// waveguide is loaded on one side. The stiffening of rubber and the lateral spread of the
     /// contact are not included.

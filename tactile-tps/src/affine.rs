@@ -88,8 +88,8 @@ impl<const D: usize> Affine<D> {
         Ok(clouds.map(clouds.general()))
     }
 
-    /// The rigid motion that minimises Σ wᵢ |R xᵢ + b − yᵢ|², with a rotation R (no reflection):
-    /// the rotation closest to C = Σ w y xᵀ (Kabsch 1976; Umeyama 1991). O(n).
+    /// The rigid motion that minimises Σ wᵢ |R xᵢ + b − yᵢ|², with a rotation R (no reflection). R
+    /// is the rotation closest to C = Σ w y xᵀ (Kabsch 1976; Umeyama 1991). O(n).
     ///
     /// If the points do not determine the rotation, the smallest possible rotation is chosen.
     ///

@@ -3,7 +3,7 @@
 //!
 //! A record is a text file of lines `name: number number …`. It confirms a change that should not
 //! affect any answer. After a change that should, write the records again with
-//! `RECORD_ANSWERS=1 cargo test -p CRATE --test suite recorded`; the difference of the file shows
+//! `RECORD_ANSWERS=1 cargo test -p CRATE --test suite recorded`. The difference of the file shows
 //! the effect, and the commit explains it.
 use std::fmt::Write as _;
 

@@ -56,12 +56,12 @@ impl GainCheck {
 
 /// The gain from presses in any order.
 ///
-/// With x = ln(measured/known) of each press and its variance v: if presses of one object scatter
-/// more than v explains, the drift's variance τ² is estimated as by DerSimonian and Laird (1986,
-/// Control. Clin. Trials 7, 177), and the gain of the frames varies by τ² again. For a sensor that
-/// drifts by 2 %, the coverage of the 95 % intervals is 88 % with two presses and 92 % with four.
-/// The calibrator lacks the coupling of the object: its mean gets the additional variance
-/// `coupling_error`². The means of both objects are weighted by their inverse variances.
+/// Let x = ln(measured/known) for each press, and v its variance. If presses of one object scatter
+/// more than v explains, the variance τ² of the drift is estimated as by DerSimonian and Laird
+/// (1986, Control. Clin. Trials 7, 177), and the gain of the frames varies by τ² again. For a
+/// sensor that drifts by 2 %, the coverage of the 95 % intervals is 88 % with two presses and 92 %
+/// with four. The calibrator lacks the coupling of the object: its mean gets the additional
+/// variance `coupling_error`². The means of both objects are weighted by their inverse variances.
 pub(super) fn checked(checks: &[GainCheck], coupling_error: f64) -> CheckedGain {
     let groups = [CheckedObject::Sample, CheckedObject::Calibrator].map(|object| {
         let of_object = checks.iter().filter(move |check| check.object == object);

@@ -5,9 +5,9 @@
 //!
 //! φ(s) − (2/π) ∫₀ᵃ K(s, t) φ(t) dt = (E*/π)(δ − s²/R),  K = ∫₀^∞ (1 − L(ξh)) cos ξs cos ξt dξ,
 //!
-//! with φ(a) = 0 because the pressure ends smoothly, and F = 2π ∫ φ. Both bodies may be elastic:
-//! 1/E* is then the sum of the sphere's compliance and the touched layer's, and the deficit 1 − L
-//! is multiplied by the layer's share of it. K is analytic, so Nyström's method on Gauss nodes
+//! with φ(a) = 0 because the pressure ends smoothly, and F = 2π ∫ φ. Both bodies may be elastic.
+//! 1/E* is then the sum of the compliances of the sphere and the touched layer, and the deficit 1 −
+//! L is multiplied by the fraction of the layer. K is analytic, so Nyström's method on Gauss nodes
 //! converges exponentially.
 
 use super::{Layer, Waveguide};

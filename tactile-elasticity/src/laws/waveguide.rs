@@ -8,7 +8,7 @@ use crate::error::{ElasticityError, Quantity, poisson};
 
 /// F = E* f(a): the linear contact of a ball with bonded layers on a rigid base
 /// ([`LayerEquation`](crate::contact::LayerEquation)), tabulated, times a finite-strain correction.
-/// E* is that of the ball and the touched layer.
+/// E* refers to the ball and the touched layer.
 ///
 /// Assumes no friction, no adhesion, neo-Hookean bodies with ν near 0.495, a/R up to 1.2 and a/h up
 /// to 1.6. It is fitted to the finite elements of `tactile-fem`, whose scatter is the error of the

@@ -233,7 +233,7 @@ impl Bodies {
 
     /// States the possible work of adhesion w (J/m²) of a ball, [`Source::Adhesion`]. The contact
     /// of a ball of radius R under a force F appears softer by ½ √(6πwR/F), to first order in √w
-    /// (Johnson, Kendall and Roberts 1971): the radius corresponds to the force F + √(6πwR F), and
+    /// (Johnson, Kendall and Roberts 1971). The radius corresponds to the force F + √(6πwR F), and
     /// the pressure lacks its rim. For other objects it has no effect.
     ///
     /// # Errors

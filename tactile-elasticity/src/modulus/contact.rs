@@ -235,13 +235,13 @@ pub type BondedLayer = ContactEstimator<LayerLaw>;
 /// and thin layers, with a correction for finite strain.
 ///
 /// Range: a/R up to 1.2 and a/h up to 1.6, with a warning outside. It was tested on finite-element
-/// contacts (neo-Hookean, ν = 0.495) that were not used for the correction, on the paper's guide
-/// and on single layers, with 30 to 250 kPa and 3 to 20 mm. The modulus from one contact radius has
-/// a median error of 0.6 % and a maximum of 6.1 % (if the guide has two thirds of the compliance).
-/// For contacts of an independent program, the error is below 0.5 % on a rigid flat up to a/R =
-/// 0.9, and below 1.7 % on the paper's guide up to 1.07. From the indentation, the approach of the
-/// ball's centre, it is below 0.4 % on the flat and 12 % on the guide. The error of the law is part
-/// of the interval.
+/// contacts (neo-Hookean, ν = 0.495) that were not used for the correction. They are on the paper's
+/// guide and on single layers, with 30 to 250 kPa and 3 to 20 mm. The modulus from one contact
+/// radius has a median error of 0.6 % and a maximum of 6.1 % (if the guide has two thirds of the
+/// compliance). For contacts of an independent program, the error is below 0.5 % on a rigid flat up
+/// to a/R = 0.9, and below 1.7 % on the paper's guide up to 1.07. From the indentation, the
+/// approach of the ball's centre, it is below 0.4 % on the flat and 12 % on the guide. The error of
+/// the law is part of the interval.
 ///
 /// The set-up solves about 45 contact radii for a dozen ratios of stiffness. An estimate then
 /// interpolates.

@@ -222,11 +222,11 @@ impl<'a, L: ContactLaw + ?Sized> ContactFit<'a, L> {
 
     /// The mean for which the assumed share of the other body equals the resulting share.
     ///
-    /// The resulting share decreases as the assumed one increases: the larger the part of a layer
-    /// on a stiff base, the stiffer the contact, and the softer the bodies that explain it. Their
-    /// difference has one zero between 0 and 1. It is found by secants, and by bisection if these
-    /// leave the bracket or are slow. A fixed-point iteration would oscillate forever if a thin
-    /// layer has most of the compliance. The search starts at the share `from`.
+    /// The resulting fraction decreases as the assumed one increases: a larger part of a layer on a
+    /// stiff base makes the contact stiffer, so that softer bodies explain it. Their difference has
+    /// one zero between 0 and 1. It is found by secants, and by bisection if these leave the
+    /// bracket or are slow. A fixed-point iteration would oscillate forever if a thin layer has
+    /// most of the compliance. The search starts at the share `from`.
     fn consistent(&self, reach: f64, from: f64) -> Result<Consistent, ElasticityError> {
         if !self.feels_share {
             return self.mean_at(0.0, reach);

@@ -130,7 +130,7 @@ impl StressStrainRegression {
     }
 
     /// The slope with its error by source. Errors of stresses and strains from sources other than
-    /// noise change the slope as shifts of the points do: shifts dS of S and de of e change it by Σ
+    /// noise change the slope like shifts of the points. Shifts dS of S and de of e change it by Σ
     /// w (e − ē)(dS − E de)/Σ w (e − ē)².
     fn by_source(points: &[Point], line: &Line) -> Uncertain {
         let noise = |of: fn(&Point) -> &Uncertain, scale: f64| {

@@ -15,10 +15,11 @@ use tactile_core::{Interval, Source, Uncertain, statistics::quantile_95};
 /// that the tabulated forces at the measured contact radii agree best with the measured forces, for
 /// all loads together.
 ///
-/// ln F(aᵢ, E) = ln Fᵢ is solved for ln E by generalised least squares (Gauss–Newton), with the
-/// covariance of forces and radii, the errors common to all loads, and the error of the table. The
-/// interval follows the table, and has no upper end if it leaves the table. Loads outside the table
-/// are skipped with a warning. O(n) in the loads; two loads take several microseconds.
+/// ln F(aᵢ, E) = ln Fᵢ is solved for ln E by generalised least squares (Gauss–Newton). The
+/// covariance contains the errors of forces and radii, the errors common to all loads, and the
+/// error of the table. The interval follows the table, and has no upper end if it leaves the table.
+/// Loads outside the table are skipped with a warning. O(n) in the loads; two loads take several
+/// microseconds.
 ///
 /// ```
 /// use tactile_elasticity::contact::{ContactCurve, ContactTable, Waveguide};

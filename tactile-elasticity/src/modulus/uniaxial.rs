@@ -1,7 +1,7 @@
 //! Specimens with a flat face, compressed without friction: strain and conjugate stress from the
 //! area of the face.
 //!
-//! Under uniaxial load a block or a cylinder of any outline deforms homogeneously: the face
+//! Under uniaxial load a block or a cylinder of any outline deforms homogeneously. The face
 //! stretches by λ_t in its plane and by λ_z normal to it, and its area is A = A₀ λ_t². Let f be a
 //! strain measure (for Green–Lagrange f(λ) = ½(λ² − 1)), with Poisson's ratio defined by the same
 //! measure: f(λ_t) = −ν f(λ_z). For Hencky's measure and ν = ½ this is incompressibility, λ_z

@@ -361,7 +361,7 @@ fn interpolate(points: &[(f64, f64)], v: f64) -> Option<f64> {
 /// Least-squares fit of a level and a slope over x, or of a slope alone.
 struct Fit {
     coefficients: Vector2<f64>,
-    /// (XᵀWX)⁻¹. If the level is not fitted, its entries are those of the identity.
+    /// (XᵀWX)⁻¹. If the level is not fitted, its entries are taken from the identity.
     inverse: Matrix2<f64>,
     /// Standard deviation of the error of a pair of weight 1.
     residual_sd: f64,

@@ -9,7 +9,6 @@ use super::FaceReading;
 /// Pixels on either side of the outline whose light is summed. Blur of 0.8 pixels moves 1 %
 /// further. This light is missing equally inside, where pixels are counted as whole, and outside.
 const BAND: u8 = 2;
-/// Pixels from there inwards over which the light is averaged: more is quieter, fewer follow a
 /// Width in pixels of the ring further inside in which the light is averaged: a wider ring has less
 /// noise, a narrower one follows texture more closely.
 const RING: u8 = 4;

@@ -81,8 +81,9 @@ pub enum ProfileShape {
 pub struct HertzFit {
     /// Centre [x, y] in pixels.
     pub centre_px: [Estimate; 2],
-    /// Contact radius in units of the pixel width, with the errors of noise and of the profile's
-    /// law: a hundredth of a pixel and 0.03 % of the radius, which are common to repeated frames.
+    /// Contact radius in units of the pixel width, with the errors of noise and of the law of the
+    /// profile. The latter are a hundredth of a pixel and 0.03 % of the radius, common to repeated
+    /// frames.
     pub radius_px: Uncertain,
     /// Contact radius in metres.
     pub radius_m: Uncertain,
@@ -337,8 +338,8 @@ impl HertzFitter {
         }
     }
 
-    /// Normal equations over all pixels of the rings. If the bend is not fitted, its row is that of
-    /// the identity.
+    /// Normal equations over all pixels of the rings. If the bend is not fitted, its row is taken
+    /// from the identity.
     fn assemble(&self, rings: &Rings, state: &State, variance: PixelVariance<'_>) -> Equations {
         let shape = &state.shape;
         let mut e = Equations::zeros();

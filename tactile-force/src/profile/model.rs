@@ -1,8 +1,8 @@
 //! The blurred pressure profile and its derivatives.
 //!
 //! It is based on E √(z + N)₊ for a standard normal N: a square-root edge blurred by a Gaussian.
-//! Let h(z) be this mean. Then h″ = ½ h − z h′ (√ is homogeneous of degree ½, and Gaussian means
-//! obey the heat equation), so every derivative follows from h and h′: h⁽ⁿ⁺²⁾ = (½ − n) h⁽ⁿ⁾ − z
+//! Let h(z) be this mean. Then h″ = ½ h − z h′, because √ is homogeneous of degree ½ and Gaussian
+//! means obey the heat equation. Every derivative follows from h and h′: h⁽ⁿ⁺²⁾ = (½ − n) h⁽ⁿ⁾ − z
 //! h⁽ⁿ⁺¹⁾. At zero h(0) = Γ(¾)/(2^¾ √π) and h′(0) = Γ(¼)/(2^(9/4) √π).
 
 /// Nodes at every quarter from −8 to 16. Below this range h < 1e-15; above it the asymptotic series

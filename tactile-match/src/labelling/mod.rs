@@ -18,13 +18,13 @@
 //! | (19) | support `S_ij = Σ_{a∈N(i)} Σ_{b∈N(j)} M_ab r(ia, jb)` |
 //! | (20) | `M_ij ← M_ij S_ij / Σ_j' M_ij' S_ij'`, the slack entry with a constant gain in place of `S` |
 //!
-//! Four equations need an interpretation. β compares directions: a difference of printed angles
-//! breaks at ±180° and does not exist in 3-D, whereas the angle between the vectors is defined
-//! everywhere and agrees with the difference elsewhere. The maximum in α may be taken per pair or
-//! over all pairs: [`LengthMaximum`] offers both. γ is printed for the model's edge alone, which
-//! treats the graphs differently: [`Compatibility`] offers this form and, as the default, the
-//! product of both. γ is zero for the farthest neighbour of a point, so a point with one neighbour
-//! has no support, as printed.
+//! Four equations need an interpretation. β compares directions by the angle between the vectors,
+//! which is defined everywhere. The printed difference of angles breaks at ±180° and does not exist
+//! in 3-D; elsewhere the two agree. The maximum in α may be taken per pair or over all pairs:
+//! [`LengthMaximum`] offers both. γ is printed for the model's edge alone, which treats the graphs
+//! differently: [`Compatibility`] offers this form and, as the default, the product of both. γ is
+//! zero for the farthest neighbour of a point, so a point with one neighbour has no support, as
+//! printed.
 //!
 //! One sweep costs `O(I J A B)` for `A` and `B` neighbours per point. With neighbourhoods of the
 //! median radius `A ≈ I/2` and `B ≈ J/2`: this is fourth order, not third order as the paper
@@ -323,7 +323,7 @@ impl RelaxationLabelling {
     /// the time (default: all).
     ///
     /// The pairs of largest first probability are kept. The others stay zero, which (20) preserves.
-    /// The contribution of pair `(a, b)` to pair `(i, j)` in (19) does not depend on M: these
+    /// The contribution of pair `(a, b)` to pair `(i, j)` in (19) does not depend on M. These
     /// links, at most `I A c²`, are computed once per outer iteration, and a sweep costs one
     /// multiplication per link instead of `O(I J A B)`. With as many candidates as targets the
     /// answer is the dense one to rounding. Once the match of a point is settled (to a hundred

@@ -37,9 +37,10 @@ const CLEAR_GAIN: [f64; 2] = [5.0, 0.05];
 /// Minimum gain of a rotation that is not allowed, beyond e⁵, in square roots of the number of
 /// coordinates: the noise of either answer varies by one of them.
 const CLEAR_CHANCE: f64 = 4.0;
-/// A lattice step fits the targets equally well if its distances are below this multiple,
+/// A lattice step fits the targets equally well if its distances are below this multiple of those
+/// without it, plus [`ROUNDING`].
 const AS_NEAR: f64 = 1.5;
-/// plus this allowance for rounding, in spacings.
+/// Allowance for rounding in spacings.
 const ROUNDING: f64 = 0.02;
 /// Points closer than this, in spacings, are not one step apart.
 const SHORTEST_STEP: f64 = 0.6;
@@ -366,8 +367,8 @@ impl<const D: usize> SoftassignWorkspace<D> {
         10 * far.count() > self.model.len()
     }
 
-    /// Whether both sets hold the same points, all in view: nearly all are matched, and their
-    /// bounding box has changed in a way that it would not for two views of more points.
+    /// Whether both sets contain the same points, all in view. If so, nearly all are matched, and
+    /// their bounding box has changed in a way that it would not for two views of more points.
     fn is_whole(&self, step: &SVector<f64, D>) -> bool {
         let larger = self.model.len().max(self.target.len()) as f64;
         let sides = |points: &[[f64; D]]| -> [f64; D] {

@@ -74,6 +74,7 @@ pub(super) struct State<const D: usize> {
     /// Whether many points move farther than allowed.
     pub far: bool,
     /// Fraction of the matched points whose residual exceeds the noise of the others, see
+    /// [`Annealer::tail`].
     pub tail: f64,
     /// Spread of the soft partners within a row, relative to the temperature: 1 for undecided, 0
     /// for decided.

@@ -272,7 +272,7 @@ impl<const D: usize> ScaleAverage<D> {
     }
 }
 
-/// Column `p` of `[Lₛ X]`. The first `smooth` columns are those of the prior.
+/// Column `p` of `[Lₛ X]`. The first `smooth` columns belong to the prior.
 fn column_of<'a>(prior: &'a Prior, affine: &'a [f64], smooth: usize, p: usize) -> &'a [f64] {
     if p < smooth {
         prior.column(p)

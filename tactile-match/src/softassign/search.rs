@@ -568,7 +568,7 @@ impl AnnealedSoftassign {
         }
     }
 
-    /// Whether no further start can do better: the answer is exact, or the residuals of a dense set
+    /// Whether no further start can do better. The result is exact, or the residuals of a dense set
     /// are so far below its spacing that no part can be displaced, or noise explains residuals and
     /// soft partners.
     fn is_done<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
@@ -606,8 +606,8 @@ impl AnnealedSoftassign {
 }
 
 impl<const D: usize> SoftassignWorkspace<D> {
-    /// Whether a run from the motions of blocks kept their matches: nearly all points within the
-    /// box of the targets have a partner, and the pairs make the targets likelier than chance.
+    /// Whether a run from the motions of blocks kept their matches. If so, nearly all points within
+    /// the box of the targets have a partner, and the pairs make the targets likelier than chance.
     pub(super) fn is_likely(&self) -> bool {
         let dense = self.model.len().min(self.target.len()) >= MIN_DENSE_POINTS;
         let sides: [_; D] = std::array::from_fn(|k| {

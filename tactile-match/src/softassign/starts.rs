@@ -408,9 +408,9 @@ impl<const D: usize> Local<D> {
     }
 }
 
-/// The best local map so far: the one with the most hits, among those the one with the smallest
-/// misfit, and among those that differ only by rounding (as in a lattice) the one with the least
-/// motion.
+/// The best local map so far: the one with the most hits, and among equals the one with the
+/// smallest residual. Among maps that differ only by rounding (as in a lattice), it is the one with
+/// the least motion.
 struct Best<const D: usize> {
     hits: usize,
     misfit: f64,

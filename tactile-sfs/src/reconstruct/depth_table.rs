@@ -173,7 +173,7 @@ impl<T: PixelScalar> DepthTable<T> {
     /// ([`with_contact_threshold`](Self::with_contact_threshold)), to a tenth of the largest signal
     /// or less, because the parabola is extrapolated from there to zero. Depth must be a smooth
     /// function of the signal in that range. If the light is proportional to the power 0.8 or 1.2
-    /// of the depth, the zero is wrong by 3 or 4 % of the range, which the table does not reveal.
+    /// of the depth, the zero is wrong by 3 or 4 % of the range. The table does not reveal this.
     /// O(entries).
     ///
     /// ```

@@ -40,10 +40,11 @@ const INSIDE: f64 = 0.8;
 /// Rounds of rejecting wrong pairs. Each round excludes those rejected in the last.
 const ROUNDS: usize = 4;
 
-/// Noise above this multiple of the typical one may be deformation that the pairs do not resolve,
+/// Noise above this multiple of the typical noise may be deformation that the pairs do not resolve,
+/// if it is at least the fraction [`NOTICEABLE`] of the spacing.
 const FAR_ABOVE: f64 = 3.0;
 
-/// if it is at least this fraction of the spacing.
+/// Fraction of the spacing above which unresolved deformation is noticeable.
 const NOTICEABLE: f64 = 0.02;
 
 /// A displacement field through pairs, with its gradient and their errors.
@@ -60,9 +61,8 @@ const NOTICEABLE: f64 = 0.02;
 /// pairs. Fewer than 16 pairs determine only an affine field. The gradient is undetermined along
 /// directions that the points do not span: its variance is infinite there.
 ///
-/// A pair is rejected if it contradicts its neighbours, unless three of them share its motion: its
-/// distance from the prediction by the others exceeds six standard deviations and a seventh of the
-/// spacing.
+/// A pair is rejected if its distance from the prediction by its neighbours exceeds six standard
+/// deviations and a seventh of the spacing, unless three of them share its motion.
 ///
 /// ```
 /// use nalgebra::Point2;

@@ -28,9 +28,9 @@
 //! Zhang and Zhao 2007).
 //!
 //! A fitted profile also gives approximately the order in which a front from the rim reaches the
-//! pixels. Every node is upwind of the nodes that it lowers: if nodes are visited in the order of
-//! their values, all have their final value after one pass (Tsitsiklis 1995, Sethian 1996). This
-//! order is only a first step: sweeps follow until no value changes.
+//! pixels. Every node is upwind of the nodes that it lowers. If nodes are visited in the order of
+//! their values, all therefore have their final value after one pass (Tsitsiklis 1995, Sethian
+//! 1996). This order is only a first step: sweeps follow until no value changes.
 //!
 //! References: Rouy and Tourin 1992 (viscosity), Zhao 2005 (fast sweeping), Bak, McLaughlin and
 //! Renzi 2010 (locking), Prados and Faugeras 2005 (oblique light).

@@ -1,7 +1,7 @@
 //! The shading next to the boundary of a round contact, from a profile fitted to the inside.
 //!
-//! The last two or three pixels before an occluding boundary have the largest errors in a frame:
-//! they are partly covered, blurred by the lens, and infinitely steep at the contour. A surface
+//! The last two or three pixels before an occluding boundary have the largest errors in a frame.
+//! They are partly covered, blurred by the lens, and infinitely steep at the contour. A surface
 //! that starts there inherits all of their errors. For an elliptical body cut in half by the plane,
 //! as for Hertz's pressure under any two smooth bodies, R² = 1 − x²/a² − y²/b². This is a quadratic
 //! function of the pixel position, which the inside determines and which is zero on the contour.
@@ -10,7 +10,7 @@
 //! y²/b² and c from −0.3 to 0.15. The zero of the quadratic then misses the contour by up to a
 //! hundredth of a, where the surface is steepest. On a press simulated by finite elements the
 //! heights were 10 and 14 % too high. Therefore R² = A (1 − ρ²) (1 − c ρ²)² is fitted to the means
-//! of R² along the ellipses of the quadratic, and used if it explains most of the residual of the
+//! of R² along the ellipses of the quadratic. It is used if it explains most of the residual of the
 //! quadratic.
 //!
 //! Contact detection fits a round profile with the same bend to the frame. This profile is

@@ -1,11 +1,11 @@
 //! Gauss–Seidel sweeps of the frontal equation p²/n_x² + q²/n_y² = k, with n_x and n_y the slopes
 //! of the upwind edges, and of the oblique equation R √(1 + |∇z|²) + s_x p + s_y q = s_z.
 //!
-//! With k = 1 the frontal equation is of first order: p and n_x belong to the middle of the edge in
-//! x, but q and n_y to the middle of the edge in y. With the direction φ of the gradient, p²/n_x² +
-//! q²/n_y² = cos²φ_x + sin²φ_y, with φ_x and φ_y at those two positions. A second solution with k =
-//! 1 + cos²φ_x − cos²φ_y, and φ from the first, removes that error (deferred correction). A profile
-//! fitted to the light gives φ before the first solution.
+//! With k = 1 the frontal equation is of first order, because p and n_x belong to the middle of the
+//! edge in x, but q and n_y to that of the edge in y. With the direction φ of the gradient,
+//! p²/n_x² + q²/n_y² = cos²φ_x + sin²φ_y, with φ_x and φ_y at those two positions. A second
+//! solution with k = 1 + cos²φ_x − cos²φ_y, and φ from the first, removes that error (deferred
+//! correction). A profile fitted to the light gives φ before the first solution.
 
 use super::profile::Profile;
 use super::{EikonalBuffers, Node};

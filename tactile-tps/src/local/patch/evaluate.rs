@@ -302,7 +302,8 @@ fn average<const D: usize>(means: impl Iterator<Item = (f64, Mean<D>)>) -> Mean<
 }
 
 /// Variance ratio of a Gaussian whose 95 % interval is as wide as that of Student's distribution,
-/// by the Cornish–Fisher expansion: 4 % too small at two degrees of freedom, accurate from ten on.
+/// by the Cornish–Fisher expansion. It is 4 % too small at two degrees of freedom, and accurate
+/// from ten on.
 fn student(degrees: usize) -> f64 {
     let v = (degrees.max(1)) as f64;
     let quantile = 1.96 + 2.372 / v + 2.823 / (v * v) + 2.556 / (v * v * v);
