@@ -447,11 +447,11 @@ def mixed(p):
 
 
 case("frames", "mixed_sizes.tif", depths, mixed)
-quarter, halfs, fulls = bytes([128]) * 768, bytes([128]) * 1536, bytes([128]) * 3072
+quarter, halves, fulls = bytes([128]) * 768, bytes([128]) * 1536, bytes([128]) * 3072
 deep = lambda bits: [(f.astype("<u2") << (bits - 8)).tobytes() for f in frames]
 eight = [f.tobytes() for f in frames]
-for space, luma, rest in [("mono", eight, b""), ("422", eight, halfs), ("444", eight, fulls), ("411", eight, quarter), ("420mpeg2", eight, quarter), ("420paldv", eight, quarter),
-                          ("444alpha", eight, fulls + fulls[:1536]), ("420p10", deep(10), quarter * 2), ("422p12", deep(12), halfs * 2), ("444p16", deep(16), fulls * 2), ("mono10", deep(10), b""), ("mono16", deep(16), b"")]:
+for space, luma, rest in [("mono", eight, b""), ("422", eight, halves), ("444", eight, fulls), ("411", eight, quarter), ("420mpeg2", eight, quarter), ("420paldv", eight, quarter),
+                          ("444alpha", eight, fulls + fulls[:1536]), ("420p10", deep(10), quarter * 2), ("422p12", deep(12), halves * 2), ("444p16", deep(16), fulls * 2), ("mono10", deep(10), b""), ("mono16", deep(16), b"")]:
     case("frames", f"space_{space}.y4m", depths, lambda p: b"YUV4MPEG2 W48 H32 F25:1 Ip A1:1 C" + space.encode() + b" XYSCSS=420JPEG\n" + b"".join(b"FRAME Ippp\n" + d + rest for d in luma))
 case("frames", "space_none.y4m", depths, lambda p: b"YUV4MPEG2 W48 H32 F25:1\n" + b"".join(b"FRAME\n" + d + quarter for d in eight))
 case("frames", "space_rgb.y4m", "colour space", lambda p: b"YUV4MPEG2 W48 H32 F25:1 Crgb\n" + b"".join(b"FRAME\n" + d * 3 for d in eight))

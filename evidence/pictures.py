@@ -20,6 +20,9 @@ IMAGE = re.compile(r'<image x="(\d+)" y="(\d+)"[^>]*>')
 PICTURES = {
     "press": (["measure"], [(0, "frames", 1, "1. frame"), (0, "surfaces", 1, "2. surface (apparent)"),
                             (0, "displacement", 0, "3. displacement and strain"), (0, "summary", 0, "4. modulus, beside the truth")]),
+    "sensor": (["calibrate examples/data/sensor/calibration.toml"], [(0, "sensor", 0, ""), (0, "sensor", 1, "")]),
+    "dark_gel": (["depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv --pixel-um 100 "
+                  "examples/data/dark_frame.pgm"], [(0, "dark_frame_depth", 0, "")]),
     "strain": (["strain examples/data/before.csv examples/data/after.csv"], [(0, "strain", 0, ""), (0, "strain", 3, "")]),
     "scan": (["inclusion examples/data/inclusion/scan.toml"], [(0, "inclusion", 2, ""), (0, "inclusion", 3, "")]),
     "gel": (["depth --sensor examples/data/colour/sensor.toml examples/data/colour/press_6.png"], [(0, "press_6_depth", 0, "")]),
@@ -40,7 +43,9 @@ def picture(program, calls, panels):
     with tempfile.TemporaryDirectory() as folder:
         for k, call in enumerate(calls):
             out = pathlib.Path(folder) / str(k)
-            subprocess.run([program, *call.split(), "--out", out], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+            # A calibration writes a file, and its picture beside it.
+            written = out / "sensor.toml" if call.startswith("calibrate") else out
+            subprocess.run([program, *call.split(), "--out", written], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
             for path in out.glob("*.svg"):
                 drawn[k, path.stem] = list(panels_of(path.read_text()))
     top = 40 if any(heading for *_, heading in panels) else 0

@@ -1,5 +1,7 @@
 //! The guide names every kind of caution, and a remedy for each.
 
+use std::path::Path;
+
 /// The variants of an enum in the words of JSON, read from its source.
 fn kinds<'a>(source: &'a str, name: &str) -> impl Iterator<Item = String> + 'a {
     let (_, rest) = source
@@ -26,6 +28,23 @@ fn words(source: &str) -> impl Iterator<Item = String> + '_ {
     quoted.map(str::to_owned)
 }
 
+/// The kinds that the program warns of by itself, read from its sources.
+fn printed(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    let found = entries.flat_map(|path| {
+        if path.is_dir() {
+            return printed(&path);
+        }
+        let source = std::fs::read_to_string(&path).unwrap();
+        let calls = source.split(".warn(").skip(1);
+        let first = calls.filter_map(|call| call.trim_start().strip_prefix('"')?.split('"').next());
+        first.map(str::to_owned).collect()
+    });
+    found.collect()
+}
+
 #[test]
 fn the_guide_has_a_remedy_for_every_kind_of_caution() {
     let page = include_str!("../../docs/cautions.md");
@@ -37,7 +56,10 @@ fn the_guide_has_a_remedy_for_every_kind_of_caution() {
         .chain(kinds(warning, "Warning"))
         .chain(kinds(inclusion, "InclusionWarning"))
         .chain(words(include_str!("../../tactile-gel/src/frame_check.rs")))
-        .chain(words(include_str!("../../tactile-gel/src/calibration.rs")));
+        .chain(words(include_str!("../../tactile-gel/src/calibration.rs")))
+        .chain(printed(
+            &Path::new(env!("CARGO_MANIFEST_DIR")).join("tactile-cli/src"),
+        ));
     let mut count = 0;
     for kind in listed {
         let row = page
