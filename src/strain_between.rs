@@ -2,9 +2,10 @@
 use crate::elasticity::ElasticityError;
 use crate::elasticity::field::{StrainField, StrainSummary};
 use crate::elasticity::strain::{Deformation, GreenLagrange, StrainMeasure};
-use crate::matching::{AnnealedSoftassign, Doubt, MatchError, Matching, PointMatcher};
+use crate::matching::{AnnealedSoftassign, Doubt, MatchError, Matching, PointMatcher, StopReason};
 use crate::tps::{LocalField, LocalValue, TpsError, nearest_rows};
 use nalgebra::{Matrix3, Point, SMatrix, SVector};
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 /// The matcher and the strain measure of [`strain_between`].
@@ -23,7 +24,11 @@ pub struct StrainBetweenOptions<const D: usize> {
     pub(crate) matcher: Arc<dyn PointMatcher<D> + Send + Sync>,
     measure: Arc<dyn StrainMeasure + Send + Sync>,
     doubtful_pairs: bool,
+    watch: Watch,
 }
+
+/// Whether to go on.
+type Watch = Arc<dyn Fn() -> ControlFlow<()> + Send + Sync>;
 
 impl<const D: usize> Default for StrainBetweenOptions<D>
 where
@@ -35,6 +40,7 @@ where
             matcher: Arc::new(AnnealedSoftassign::default()),
             measure: Arc::new(GreenLagrange),
             doubtful_pairs: false,
+            watch: Arc::new(|| ControlFlow::Continue(())),
         }
     }
 }
@@ -62,6 +68,48 @@ impl<const D: usize> StrainBetweenOptions<D> {
         self
     }
 
+    /// Calls `watch` many times a second and stops with
+    /// [`TpsError::Stopped`](crate::tps::TpsError::Stopped) if it returns `Break`.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use std::ops::ControlFlow;
+    /// use tactile_imaging::{StrainBetweenOptions, strain_between, tps::TpsError};
+    /// let points: Vec<_> = (0..36).map(|k| Point2::new(f64::from(k % 6), f64::from(k / 6))).collect();
+    /// let options = StrainBetweenOptions::default()
+    ///     .with_doubtful_pairs()
+    ///     .with_watch(|| ControlFlow::Break(()));
+    /// let stopped = strain_between(&points, &points, &options).unwrap_err();
+    /// assert_eq!(stopped, TpsError::Stopped.into());
+    /// ```
+    #[must_use]
+    pub fn with_watch(
+        mut self,
+        watch: impl Fn() -> ControlFlow<()> + Send + Sync + 'static,
+    ) -> Self {
+        self.watch = Arc::new(watch);
+        self
+    }
+
+    fn work(&self) -> (&dyn StrainMeasure, &dyn Fn() -> ControlFlow<()>) {
+        (&*self.measure, &*self.watch)
+    }
+
+    /// The match of two sets.
+    pub(crate) fn matched(
+        &self,
+        before: &[Point<f64, D>],
+        after: &[Point<f64, D>],
+    ) -> Result<Matching<D>, StrainBetweenError> {
+        let found = self
+            .matcher
+            .match_watched(before, after, &mut || (self.watch)())?;
+        match found.report.stop {
+            StopReason::Cancelled => Err(TpsError::Stopped.into()),
+            _ => Ok(found),
+        }
+    }
+
     /// Strain from the pairs of tracks, even if they are few of the points.
     pub(crate) fn total(
         &self,
@@ -69,8 +117,14 @@ impl<const D: usize> StrainBetweenOptions<D> {
         after: &[Point<f64, D>],
         pairs: &[(usize, usize)],
     ) -> Result<StrainBetween<D>, StrainBetweenError> {
-        let found = StrainBetween::of_share(before, after, pairs, &*self.measure, pairs.len())?;
-        self.allow(found)
+        let possible = pairs.len();
+        self.allow(StrainBetween::of_share(
+            before,
+            after,
+            pairs,
+            self.work(),
+            possible,
+        )?)
     }
 
     /// The strain, or an error if its pairs are doubtful and such pairs are not allowed.
@@ -256,7 +310,7 @@ pub fn strain_between<const D: usize>(
     after: &[Point<f64, D>],
     options: &StrainBetweenOptions<D>,
 ) -> Result<StrainBetween<D>, StrainBetweenError> {
-    let matching = options.matcher.match_points(before, after)?;
+    let matching = options.matched(before, after)?;
     StrainBetween::of_matching(before, after, &matching, options)
 }
 
@@ -280,7 +334,8 @@ impl<const D: usize> StrainBetween<D> {
         {
             return Err(StrainBetweenError::Doubtful(doubt));
         }
-        let mut found = Self::of_pairs(before, after, &pairs, options.measure.as_ref())?;
+        let possible = before.len().min(after.len());
+        let mut found = Self::of_share(before, after, &pairs, options.work(), possible)?;
         found.doubt = doubt.or(found.doubt);
         options.allow(found)
     }
@@ -333,7 +388,7 @@ impl<const D: usize> StrainBetween<D> {
             places.collect()
         });
         let pairs: Vec<_> = (0..known.len()).map(|k| (k, k)).collect();
-        let mut found = Self::of_pairs(&from, &to, &pairs, options.measure.as_ref())?;
+        let mut found = Self::of_share(&from, &to, &pairs, options.work(), pairs.len())?;
         for (i, j) in &mut found.rows {
             (*i, *j) = (known[*i], known[*j]);
         }
@@ -355,7 +410,8 @@ impl<const D: usize> StrainBetween<D> {
         measure: &dyn StrainMeasure,
     ) -> Result<Self, StrainBetweenError> {
         let possible = before.len().min(after.len());
-        Self::of_share(before, after, matched, measure, possible)
+        let watch = || ControlFlow::Continue(());
+        Self::of_share(before, after, matched, (measure, &watch), possible)
     }
 
     /// Like `of_pairs`, if this number of points can have a partner.
@@ -363,7 +419,7 @@ impl<const D: usize> StrainBetween<D> {
         before: &[Point<f64, D>],
         after: &[Point<f64, D>],
         matched: &[(usize, usize)],
-        measure: &dyn StrainMeasure,
+        (measure, watch): (&dyn StrainMeasure, &dyn Fn() -> ControlFlow<()>),
         possible: usize,
     ) -> Result<Self, StrainBetweenError> {
         // An affine field, and one more pair for its error.
@@ -378,7 +434,7 @@ impl<const D: usize> StrainBetween<D> {
         }
         let mut sources: Vec<_> = rows.iter().map(|&(i, _)| before[i]).collect();
         let targets: Vec<_> = rows.iter().map(|&(_, j)| after[j]).collect();
-        let field = LocalField::fit(&sources, &targets)?;
+        let field = LocalField::fit_watched(&sources, &targets, |_| watch())?;
         let mut values = field.values.clone();
         let mut weights: Vec<f64> = (field.kept.iter())
             .map(|&kept| f64::from(u8::from(kept)))

@@ -144,7 +144,7 @@ impl<const D: usize> StrainSeries<D> {
         start: &[Point<f64, D>],
         next: &[Point<f64, D>],
     ) -> Result<StrainBetween<D>, StrainBetweenError> {
-        let matching = self.options.matcher.match_points(start, next)?;
+        let matching = self.options.matched(start, next)?;
         StrainBetween::of_matching(&self.last, next, &matching, &self.options)
     }
 }

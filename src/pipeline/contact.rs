@@ -49,7 +49,8 @@ use std::sync::Arc;
 /// let pipeline = Pipeline::new(stage, Object::sphere(3e-3))?;
 /// let mut press = pipeline.press(reference.view())?;
 /// press.add_frame(frame.view());
-/// assert_eq!(press.contact(0)?.and_then(|c| c.force_n).map(|f| f.value), Some(0.98));
+/// let force = press.contact(0)?.and_then(|c| c.force_n).expect("the scale's");
+/// assert!(force.value == 0.98 && (force.standard_error() - 1e-3).abs() < 1e-15, "as given");
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
 pub trait ContactStage: Send + Sync {
@@ -82,6 +83,16 @@ pub trait ContactStage: Send + Sync {
         let _ = workspace;
         *contact = self.measure(frame, reference)?;
         Ok(())
+    }
+
+    /// Whether forces are read from light, whose gain has errors beside those of the readings:
+    /// [`Source::Gain`] and [`Source::Coupling`]. Forces of other stages have the errors that the
+    /// stage gives them, and those of the two sources if they are stated.
+    ///
+    /// [`Source::Gain`]: crate::core::Source::Gain
+    /// [`Source::Coupling`]: crate::core::Source::Coupling
+    fn reads_light(&self) -> bool {
+        false
     }
 
     /// Whether a contact is brighter or darker than the reference.
@@ -137,6 +148,10 @@ impl<P: Deref<Target: ContactStage> + Send + Sync> ContactStage for P {
         contact: &mut FrameContact,
     ) -> Result<(), ForceError> {
         (**self).measure_into(workspace, frame, reference, contact)
+    }
+
+    fn reads_light(&self) -> bool {
+        (**self).reads_light()
     }
 
     fn polarity(&self) -> Polarity {

@@ -322,6 +322,10 @@ impl PipelineError {
             | Self::Material(_)
             | Self::Setting(_)
             | Self::WrongEstimator { .. } => Kind::Options,
+            Self::Contact {
+                source: ForceError::SaturatedContact { .. },
+                ..
+            } => Kind::NotDetermined,
             Self::Check { .. }
             | Self::NoSuchFrame { .. }
             | Self::Contact { .. }

@@ -154,6 +154,10 @@ impl LightContact {
 }
 
 impl ContactStage for LightContact {
+    fn reads_light(&self) -> bool {
+        true
+    }
+
     fn measure(
         &self,
         frame: ArrayView2<'_, u8>,

@@ -238,6 +238,11 @@ impl<'a> Press<'a> {
         &self.stages.pipeline
     }
 
+    /// The frame without contact.
+    pub fn reference(&self) -> &ReferenceFrame {
+        &self.stages.reference
+    }
+
     /// The image of a frame.
     ///
     /// # Errors

@@ -182,14 +182,6 @@ impl Settings {
         assumed && !shown && self.assumptions.stated(source).is_none()
     }
 
-    /// Relative error of the gain of the light, without that of the calibration.
-    pub(super) fn coupling(&self) -> f64 {
-        match self.checked_gain {
-            Some(checked) => checked.gain.relative_error(),
-            None => self.assumptions.error(Source::Coupling),
-        }
-    }
-
     /// The covariance of the layers' parameters, stated or default.
     pub(super) fn layer_covariance(&self) -> DMatrix<f64> {
         let layers = self

@@ -118,14 +118,20 @@ impl Stages {
                 }
             }
             if let Some(reading) = &mut contact.reading {
+                // A force that is not read from light has the error that its stage states.
+                let own = reading.force_n.is_some() && !self.contact.reads_light();
+                let error = |source| match own {
+                    true => settings.assumptions.stated(source).unwrap_or(0.0),
+                    false => settings.assumptions.error(source),
+                };
                 let factor = match reading.force_n {
-                    Some(_) => self.of_light(),
+                    Some(_) => self.of_light(error(Source::Coupling)),
                     None => Uncertain::exact(1.0),
                 };
                 // Above its saturation level a Hertz profile has less than this fraction of its
                 // force.
                 let factor = factor
-                    .by_relative(Source::Gain, settings.assumptions.error(Source::Gain))
+                    .by_relative(Source::Gain, error(Source::Gain))
                     .by_relative(Source::Gain, reading.saturated_share);
                 let force = reading.force_n.or_else(|| gauge.map(Uncertain::from));
                 reading.force_n = force.map(|force| force * factor);
@@ -149,12 +155,12 @@ impl Stages {
     }
 
     /// The factor for a force read from light: it corrects for light brighter than at the
-    /// calibration and for the gain by presses of known force.
-    fn of_light(&self) -> Uncertain {
+    /// calibration and for the gain by presses of known force, without which it has this error.
+    fn of_light(&self, coupling: f64) -> Uncertain {
         let settings = self.pipeline.settings();
         let mut factor = match settings.checked_gain {
             Some(checked) => Uncertain::of(checked.gain, Source::Coupling).powf(-1.0),
-            None => Uncertain::exact(1.0).by(Source::Coupling, settings.coupling()),
+            None => Uncertain::exact(1.0).by(Source::Coupling, coupling),
         };
         if let Some(light) = self.light {
             factor = factor * light.gain.value.recip();

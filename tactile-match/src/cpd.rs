@@ -23,6 +23,7 @@ use crate::frame::{Frame, spread};
 use crate::gaussian_process::{Axes, Detail, Prior, PriorScales, Regression};
 use crate::{Judgement, MatchError, Matching, StopReason, linear_assignment};
 use nalgebra::{Point, SMatrix, SVector};
+use std::ops::ControlFlow;
 use tactile_core::vectorised;
 use tactile_tps::Warp;
 
@@ -278,16 +279,20 @@ impl<const D: usize> Registration<D> {
         }
     }
 
-    /// Alternates E-step and M-step until σ² converges.
-    fn run(&mut self) {
+    /// Alternates E-step and M-step until σ² converges or `watch` stops it.
+    fn run(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) {
         if self.sigma2 <= 0.0 {
             self.stop = StopReason::Exact; // all points of both sets coincide
             return;
         }
         for _ in 0..self.options.max_iterations {
             let (before, uniform) = (self.sigma2, self.uniform());
-            self.posterior
-                .update(&self.moved.0, &self.target, before, uniform);
+            let posterior = &mut self.posterior;
+            let done = posterior.update(&self.moved.0, &self.target, (before, uniform), watch);
+            if done.is_break() {
+                self.stop = StopReason::Cancelled;
+                return;
+            }
             self.energy.push(self.posterior.energy);
             self.move_model();
             self.update_variance();
@@ -427,8 +432,14 @@ struct Posterior<const D: usize> {
 }
 
 impl<const D: usize> Posterior<D> {
-    /// Computes all sums for model points at the positions `moved`. `O(M N)`.
-    fn update(&mut self, moved: &[Vec<f64>; D], target: &[[f64; D]], sigma2: f64, uniform: f64) {
+    /// All sums for model points that have moved to `moved`. `O(M N)`.
+    fn update(
+        &mut self,
+        moved: &[Vec<f64>; D],
+        target: &[[f64; D]],
+        (sigma2, uniform): (f64, f64),
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
         let vectors = [&mut self.model_mass, &mut self.column];
         for sums in self.weighted.0.iter_mut().chain(vectors) {
             sums.clear();
@@ -440,6 +451,7 @@ impl<const D: usize> Posterior<D> {
             #[inline(always)]
             || {
                 for x in target {
+                    watch()?;
                     let sum = gaussians(&mut self.column, moved, x, sigma2);
                     let total = sum + uniform;
                     if total <= 0.0 {
@@ -456,8 +468,9 @@ impl<const D: usize> Posterior<D> {
                         }
                     }
                 }
+                ControlFlow::Continue(())
             },
-        );
+        )
     }
 }
 
@@ -599,10 +612,11 @@ impl CoherentPointDrift {
         &self,
         model: &[Point<f64, D>],
         target: &[Point<f64, D>],
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Matching<D>, MatchError> {
         point_sets(model, target)?;
         let mut registration = Registration::new(self, model, target);
-        registration.run();
+        registration.run(watch);
         Ok(registration.matching(model, target))
     }
 }

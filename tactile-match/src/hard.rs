@@ -2,10 +2,9 @@
 
 use crate::error::{point_sets, valid_distance};
 use crate::frame::{Frame, spread};
-use crate::interpolation::through;
+use crate::interpolation::fitted;
 use crate::{Judgement, MatchError, Matching, PointMatcher, StopReason, linear_assignment};
 use nalgebra::{DMatrix, Point, SVector};
-use tactile_tps::Smoothing;
 
 /// Both sets in a common frame, with all squared distances between them.
 struct Distances<const D: usize> {
@@ -58,7 +57,7 @@ impl<const D: usize> Distances<D> {
     }
 }
 
-/// Builds the result from these pairs. The warp interpolates them; confidences and covariances
+/// Builds the result from these pairs. The warp is their local field; confidences and covariances
 /// follow from the distribution of the displacements.
 fn matching<const D: usize>(
     model: &[Point<f64, D>],
@@ -66,17 +65,15 @@ fn matching<const D: usize>(
     distances: &Distances<D>,
     assignment: Vec<Option<usize>>,
 ) -> Matching<D> {
-    let pairs: Vec<(usize, usize)> = assignment
-        .iter()
-        .enumerate()
-        .filter_map(|(i, j)| j.map(|j| (i, j)))
+    let partners = assignment.iter().enumerate();
+    let pairs: Vec<_> = partners
+        .filter_map(|(i, j)| Some((i, (*j)?, 1.0)))
         .collect();
-    let total: f64 = pairs.iter().map(|&(i, j)| distances.squared[(i, j)]).sum();
+    let squares = pairs.iter().map(|&(i, j, _)| distances.squared[(i, j)]);
+    let total: f64 = squares.sum();
     let variance = total / (pairs.len().max(1) * D) as f64;
     let scale = distances.frame.scale;
-    let sources: Vec<_> = pairs.iter().map(|&(i, _)| model[i]).collect();
-    let images: Vec<_> = pairs.iter().map(|&(_, j)| target[j]).collect();
-    let (warp, warped) = through(model, &sources, &images, Smoothing::None);
+    let (warp, warped) = fitted(model, target, &pairs);
     let mut found = Matching::new(target, warp, warped, assignment);
     for (i, partner) in found.assignment.iter().enumerate() {
         let p = distances.posterior(i, variance);
@@ -92,7 +89,6 @@ fn matching<const D: usize>(
     found.energy = vec![total * scale * scale];
     found.report.judgement = Judgement::of_pairs(model, target, &found.assignment);
     (found.report.stop, found.report.iterations) = (StopReason::Converged, 1);
-    found.report.sigma = 0.0;
     found
 }
 
@@ -100,7 +96,7 @@ fn matching<const D: usize>(
 /// target, the closest of them gets it.
 ///
 /// The pairs are correct while displacements are smaller than half the distance between points. The
-/// warp interpolates the pairs. `O(I J)`.
+/// warp is that of [`Matching::from_pairs`]. `O(I J)`.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -164,7 +160,7 @@ pub(crate) fn nearest(distances: impl Iterator<Item = f64>) -> (usize, f64) {
 /// Pairs the sets so that the sum of squared distances is smallest, by [`linear_assignment`].
 ///
 /// Unlike nearest neighbours, it pairs as many points as possible, and a common translation of two
-/// sets of equal size does not change the pairs. The warp interpolates the pairs.
+/// sets of equal size does not change the pairs. The warp is that of [`Matching::from_pairs`].
 ///
 /// ```
 /// use nalgebra::{Point2, Vector2};

@@ -26,7 +26,8 @@ impl<F2: 'static, F3: 'static> Instances<F2, F3> {
 }
 
 type Found<const D: usize> = Result<Matching<D>, MatchError>;
-type Once<M, const D: usize> = fn(&M, &[Point<f64, D>], &[Point<f64, D>]) -> Found<D>;
+type Watch<'w> = &'w mut dyn FnMut() -> ControlFlow<()>;
+type Once<M, const D: usize> = fn(&M, &[Point<f64, D>], &[Point<f64, D>], Watch<'_>) -> Found<D>;
 type Next<const D: usize> =
     fn(&AnnealedSoftassign, &mut WarmStart, &[Point<f64, D>], &[Point<f64, D>]) -> Found<D>;
 type NextPairs<const D: usize> = fn(
@@ -70,10 +71,26 @@ impl AnnealedSoftassign {
     }
 }
 
+/// The first two methods of a matcher, which its table has the functions of.
+macro_rules! matched {
+    ($table:ident) => {
+        fn match_points(&self, model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Found<D> {
+            self.match_watched(model, target, &mut || ControlFlow::Continue(()))
+        }
+
+        fn match_watched(
+            &self,
+            model: &[Point<f64, D>],
+            target: &[Point<f64, D>],
+            watch: Watch<'_>,
+        ) -> Found<D> {
+            $table.of::<Once<Self, D>>(D)?(self, model, target, watch)
+        }
+    };
+}
+
 impl<const D: usize> PointMatcher<D> for AnnealedSoftassign {
-    fn match_points(&self, model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Found<D> {
-        SOFTASSIGN.of::<Once<Self, D>>(D)?(self, model, target)
-    }
+    matched!(SOFTASSIGN);
 
     fn match_next(
         &self,
@@ -96,13 +113,9 @@ impl<const D: usize> PointMatcher<D> for AnnealedSoftassign {
 }
 
 impl<const D: usize> PointMatcher<D> for CoherentPointDrift {
-    fn match_points(&self, model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Found<D> {
-        DRIFT.of::<Once<Self, D>>(D)?(self, model, target)
-    }
+    matched!(DRIFT);
 }
 
 impl<const D: usize> PointMatcher<D> for RelaxationLabelling {
-    fn match_points(&self, model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Found<D> {
-        LABELLING.of::<Once<Self, D>>(D)?(self, model, target)
-    }
+    matched!(LABELLING);
 }

@@ -2,7 +2,9 @@
 
 use crate::error::usable;
 use nalgebra::Point;
-use tactile_tps::{Affine, Factorization, FitOptions, NegR, R2LogR, Smoothing, TpsError, Warp};
+use tactile_tps::{
+    Affine, Factorization, FitOptions, LocalField, NegR, R2LogR, Smoothing, TpsError, Warp,
+};
 
 /// The factorised thin-plate system of fixed sources: `r² ln r²` in the plane, `−r` in space.
 #[derive(Clone, Debug)]
@@ -80,22 +82,79 @@ impl<const D: usize> Interpolation<D> {
     }
 }
 
-/// The warp of weighted pairs: a spline smoothed by cross-validation, an affine map for few pairs,
-/// a rigid motion for fewer, the identity for none.
+/// Fewer pairs show no more than an affine map.
+const FIELD: usize = 16;
+
+/// The warp of pairs (model row, target row, confidence) and the warped model. The warp is the local
+/// field of the pairs that are more likely right than wrong, an affine map for few pairs, a rigid
+/// motion for fewer, the identity for none.
 pub(crate) fn fitted<const D: usize>(
-    sources: &[Point<f64, D>],
-    images: &[Point<f64, D>],
-    weights: Vec<f64>,
-) -> Box<dyn Warp<D> + Send + Sync> {
-    if sources.len() >= 3 * (D + 1) {
-        return spline(sources, images, Some(weights), Smoothing::Gcv);
+    model: &[Point<f64, D>],
+    target: &[Point<f64, D>],
+    pairs: &[(usize, usize, f64)],
+) -> (Box<dyn Warp<D> + Send + Sync>, Vec<Point<f64, D>>) {
+    let ends = |&(i, j, _): &(usize, usize, f64)| (model[i], target[j]);
+    let sure: Vec<_> = pairs.iter().filter(|pair| pair.2 >= 0.5).collect();
+    if sure.len() >= FIELD {
+        let (sources, images): (Vec<_>, Vec<_>) = sure.iter().map(|pair| ends(pair)).unzip();
+        if let Ok(field) = LocalField::fit(&sources, &images) {
+            let mut moved = vec![None; model.len()];
+            for (pair, at) in sure.iter().zip(&field.values) {
+                moved[pair.0] = Some(model[pair.0] + at.displacement);
+            }
+            let left = model
+                .iter()
+                .zip(&moved)
+                .filter(|(_, moved)| moved.is_none());
+            let left: Vec<_> = left.map(|(point, _)| *point).collect();
+            let mut left = left.iter().zip(field.at(&left));
+            let mut next = || left.next().map(|(point, at)| point + at.displacement);
+            let warped: Vec<_> = moved
+                .into_iter()
+                .filter_map(|moved| moved.or_else(&mut next))
+                .collect();
+            if are_usable(&warped) {
+                return (Box::new(field), warped);
+            }
+        }
     }
+    let (sources, images): (Vec<_>, Vec<_>) = pairs.iter().map(ends).unzip();
+    // A confidence of zero would remove the pair from the fit.
+    let weights: Vec<f64> = pairs.iter().map(|pair| pair.2.max(1e-3)).collect();
     let fit = if sources.len() > D {
         Affine::fit
     } else {
         Affine::fit_rigid
     };
-    Box::new(fit(sources, images, Some(&weights)).unwrap_or_default())
+    affine(
+        model,
+        fit(&sources, &images, Some(&weights)).unwrap_or_default(),
+    )
+}
+
+/// The warped model. `None` if a coordinate is too large to be squared.
+fn finite<const D: usize>(
+    warp: &dyn Warp<D>,
+    model: &[Point<f64, D>],
+) -> Option<Vec<Point<f64, D>>> {
+    let mut warped = model.to_vec();
+    warp.apply_into(model, &mut warped).ok()?;
+    are_usable(&warped).then_some(warped)
+}
+
+fn are_usable<const D: usize>(points: &[Point<f64, D>]) -> bool {
+    points.iter().all(|p| p.iter().all(|&c| usable(c)))
+}
+
+/// An affine map and the warped model, or the identity if that cannot be squared.
+fn affine<const D: usize>(
+    model: &[Point<f64, D>],
+    affine: Affine<D>,
+) -> (Box<dyn Warp<D> + Send + Sync>, Vec<Point<f64, D>>) {
+    match finite(&affine, model) {
+        Some(warped) => (Box::new(affine), warped),
+        None => (Box::new(Affine::default()), model.to_vec()),
+    }
 }
 
 /// The thin-plate spline through these pairs. See [`Interpolation`].
@@ -116,22 +175,14 @@ pub(crate) fn through<const D: usize>(
     images: &[Point<f64, D>],
     smoothing: Smoothing,
 ) -> (Box<dyn Warp<D> + Send + Sync>, Vec<Point<f64, D>>) {
-    let finite = |warp: &dyn Warp<D>| {
-        let warped: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
-        warped
-            .iter()
-            .all(|p| p.iter().all(|&c| usable(c)))
-            .then_some(warped)
-    };
     let spline = spline(sources, images, None, smoothing);
-    if let Some(warped) = finite(&*spline) {
-        return (spline, warped);
+    match finite(&*spline, model) {
+        Some(warped) => (spline, warped),
+        None => affine(
+            model,
+            Affine::fit(sources, images, None).unwrap_or_default(),
+        ),
     }
-    let affine = Affine::fit(sources, images, None).unwrap_or_else(|_| Affine::default());
-    if let Some(warped) = finite(&affine) {
-        return (Box::new(affine), warped);
-    }
-    (Box::new(Affine::default()), model.to_vec())
 }
 
 /// Whether a warp maps the sources to these images, relative to their size. A spline loses all

@@ -4,7 +4,7 @@ use crate::error::{option_within, point_sets};
 use crate::interpolation::fitted;
 use crate::{Doubt, FittedTransformation, Judgement, MatchError};
 use nalgebra::{Point, SMatrix};
-use std::ops::Deref;
+use std::ops::{ControlFlow, Deref};
 use tactile_core::StopReason;
 use tactile_tps::{SeriesMemory, Warp};
 
@@ -50,6 +50,33 @@ pub trait PointMatcher<const D: usize>: Send + Sync {
         model: &[Point<f64, D>],
         target: &[Point<f64, D>],
     ) -> Result<Matching<D>, MatchError>;
+
+    /// Like [`match_points`](Self::match_points). A slow matcher calls `watch` many times a second.
+    /// If it returns `Break`, the matcher returns its current result with
+    /// [`StopReason::Cancelled`]. The default implementation does not call it.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use std::ops::ControlFlow;
+    /// use tactile_match::{PointMatcher, RelaxationLabelling, StopReason};
+    /// let points = [[0.0, 0.0], [4.0, 0.0], [0.0, 4.0], [3.0, 3.0]].map(Point2::from);
+    /// let mut stop = || ControlFlow::Break(());
+    /// let found = RelaxationLabelling::default().match_watched(&points, &points, &mut stop)?;
+    /// assert_eq!(found.report.stop, StopReason::Cancelled);
+    /// # Ok::<(), tactile_match::MatchError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`match_points`](Self::match_points).
+    fn match_watched(
+        &self,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<Matching<D>, MatchError> {
+        let _ = watch;
+        self.match_points(model, target)
+    }
 
     /// Like [`match_points`](Self::match_points), for the next target of a series. A matcher may
     /// start from its last match of the same model, with the state in `warm` ([`WarmStart`]). The
@@ -155,6 +182,15 @@ impl<const D: usize, P: Deref<Target: PointMatcher<D>> + Send + Sync> PointMatch
         target: &[Point<f64, D>],
     ) -> Result<Matching<D>, MatchError> {
         (**self).match_points(model, target)
+    }
+
+    fn match_watched(
+        &self,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<Matching<D>, MatchError> {
+        (**self).match_watched(model, target, watch)
     }
 
     fn match_next(
@@ -311,11 +347,11 @@ impl<const D: usize> Matching<D> {
     /// Builds the match from pairs of (model row, target row, confidence in [0, 1]), for example in
     /// a user-defined matcher.
     ///
-    /// The warp is a thin-plate spline smoothed by cross-validation if there are at least three
-    /// times as many pairs as coefficients of an affine map along an axis. With fewer pairs it is
-    /// an affine map, and with D or fewer a rigid motion. Pairs are weighted by their confidences.
-    /// The covariance of each warped point is estimated from the weighted residuals of the pairs.
-    /// Model points without a pair have confidence zero. O(n³) for up to 3000 pairs.
+    /// The warp is the [`LocalField`](tactile_tps::LocalField) of the pairs with a confidence of at
+    /// least 0.5, if there are at least 16. With fewer it is an affine map of all pairs, weighted by
+    /// their confidences, and with D or fewer a rigid motion. The covariance of each warped point is
+    /// estimated from the weighted residuals of the pairs. Model points without a pair have confidence
+    /// zero. Time and memory are linear in the number of pairs.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -354,18 +390,14 @@ impl<const D: usize> Matching<D> {
             (assignment[i], confidence[i], taken[j]) = (Some(j), probability, true);
             rows[i].push((j, probability));
         }
-        let sources: Vec<_> = pairs.iter().map(|&(i, _, _)| model[i]).collect();
-        let images: Vec<_> = pairs.iter().map(|&(_, j, _)| target[j]).collect();
-        // A confidence of zero would remove the pair from the fit.
-        let weights: Vec<f64> = pairs.iter().map(|&(_, _, c)| c.max(1e-3)).collect();
-        let warp = fitted(&sources, &images, weights.clone());
-        let warped: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
-        let mut scatter = SMatrix::zeros();
-        for (&(i, j, _), weight) in pairs.iter().zip(&weights) {
+        let (warp, warped) = fitted(model, target, pairs);
+        let (mut scatter, mut weights) = (SMatrix::zeros(), f64::MIN_POSITIVE);
+        for &(i, j, weight) in pairs {
             let residual = target[j] - warped[i];
-            scatter += residual * residual.transpose() * *weight;
+            scatter += residual * residual.transpose() * weight;
+            weights += weight;
         }
-        let covariance = scatter / weights.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let covariance = scatter / weights;
         let mut found = Self::new(target, warp, warped, assignment);
         (found.confidence, found.soft) = (confidence, rows.into_iter().collect());
         found.displacement_covariance = vec![covariance; model.len()];

@@ -16,9 +16,7 @@ fn read<'py, T: Element>(
     dtype: &str,
 ) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
     let numpy = given.py().import("numpy")?;
-    let array = numpy
-        .call_method1("asarray", (given,))
-        .map_err(|error| invalid(format!("{name} is no array: {error}")))?;
+    let array = asarray(name, given)?;
     let found = array.getattr("dtype")?;
     let kind: String = found.getattr("kind")?.extract()?;
     if !kinds.contains(&kind) {
@@ -29,6 +27,32 @@ fn read<'py, T: Element>(
     // Aligned and in the machine's order of bytes, copied only where it is not.
     let aligned = numpy.call_method1("require", (array, dtype, "A"))?;
     aligned.extract()
+}
+
+/// What NumPy makes of an argument. A mask would be lost.
+pub(crate) fn asarray<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    unmasked(name, given)?;
+    let array = given
+        .py()
+        .import("numpy")?
+        .call_method1("asarray", (given,));
+    array.map_err(|error| invalid(format!("{name} is no array: {error}")))
+}
+
+fn unmasked(name: &str, given: &Bound<'_, PyAny>) -> PyResult<()> {
+    match given.getattr_opt("mask")? {
+        Some(mask)
+            if mask
+                .call_method0("any")
+                .and_then(|any| any.is_truthy())
+                .unwrap_or(false) =>
+        {
+            Err(invalid(format!(
+                "{name} is a masked array: leave out what is masked, or fill it"
+            )))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn axes(name: &str, expected: &str, shape: &[usize]) -> PyErr {
@@ -45,6 +69,7 @@ fn two_axes<'py, T: Element>(
     dtype: &str,
 ) -> PyResult<PyReadonlyArray2<'py, T>> {
     if let Ok(array) = given.cast::<PyArray2<T>>() {
+        unmasked(name, given)?;
         let aligned = (array.data() as usize).is_multiple_of(align_of::<T>());
         if aligned && array.is_c_contiguous() {
             return Ok(array.try_readonly()?);
@@ -121,11 +146,7 @@ pub(crate) fn grey(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array2<f64>
 }
 
 fn bytes<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, u8>> {
-    let found = given
-        .py()
-        .import("numpy")?
-        .call_method1("asarray", (given,));
-    let found = found.map_err(|error| invalid(format!("{name} is no array: {error}")))?;
+    let found = asarray(name, given)?;
     let kind = found.getattr("dtype")?;
     if kind.str()? != "uint8" {
         return Err(invalid(format!(

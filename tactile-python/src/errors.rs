@@ -72,11 +72,35 @@ pub(crate) fn refused(error: impl Error + 'static) -> PyErr {
 }
 
 pub(crate) fn pipeline(error: PipelineError) -> PyErr {
-    match (&error, error.kind()) {
-        (PipelineError::NoSuchFrame { .. }, _) => PyIndexError::new_err(error.to_string()),
-        (_, PipelineErrorKind::Options | PipelineErrorKind::Input) => refused(error),
-        _ => failed(error),
-    }
+    let sentence = from_zero(&error.to_string());
+    caused(&error).unwrap_or_else(|| match (&error, error.kind()) {
+        (PipelineError::NoSuchFrame { .. }, _) => PyIndexError::new_err(sentence),
+        (_, PipelineErrorKind::Options | PipelineErrorKind::Input) => invalid(sentence),
+        _ => TactileError::new_err(sentence),
+    })
+}
+
+/// A sentence of the library, which counts frames from one, with the numbers of the calls, which
+/// count from zero.
+pub(crate) fn from_zero(sentence: &str) -> String {
+    let mut after = "";
+    let words = sentence.split_inclusive(' ').map(|word| {
+        let digits = word.len() - word.trim_start_matches(|c: char| c.is_ascii_digit()).len();
+        let counts = matches!(after, "frame" | "Frame" | "frames" | "Frames");
+        let number = word[..digits]
+            .parse::<u64>()
+            .ok()
+            .filter(|n| counts && *n > 0);
+        // "frames 1 and 2".
+        if !(counts && (digits > 0 || word.trim() == "and")) {
+            after = word.trim_matches(|c: char| !c.is_alphabetic());
+        }
+        match number {
+            Some(number) => format!("{}{}", number - 1, &word[digits..]),
+            None => word.to_owned(),
+        }
+    });
+    words.collect()
 }
 
 pub(crate) fn strain_between(error: StrainBetweenError) -> PyErr {
@@ -132,5 +156,16 @@ impl Signals {
 
     pub(crate) fn finish(&mut self) -> PyResult<()> {
         self.raised.take().map_or(Ok(()), Err)
+    }
+
+    /// Works without the interpreter's lock, until it is done or `KeyboardInterrupt` ends it.
+    pub(crate) fn during<T: Send>(
+        py: Python<'_>,
+        work: impl Send + FnOnce(&mut Self) -> T,
+    ) -> PyResult<T> {
+        let mut signals = Self::new();
+        let found = py.detach(|| work(&mut signals));
+        signals.finish()?;
+        Ok(found)
     }
 }

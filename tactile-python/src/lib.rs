@@ -40,7 +40,7 @@ mod _native {
     #[pymodule_export]
     use super::laws::{estimate_modulus, hertz};
     #[pymodule_export]
-    use super::matching::{match_points, strain_between};
+    use super::matching::{match_points, strain_between, strain_series};
     #[pymodule_export]
     use super::pipeline::{Object, Pipeline};
     #[pymodule_export]
@@ -48,7 +48,7 @@ mod _native {
     #[pymodule_export]
     use super::results::{
         Contact, Estimate, GelContact, GelReport, HertzContact, Inclusion, Load, Lump, Markers,
-        Match, Modulus, SimulatedPress, Strain, StrainBetween, Surface,
+        Match, Modulus, SimulatedPress, Strain, StrainBetween, StrainGrid, Surface,
     };
     #[pymodule_export]
     use super::run_program;

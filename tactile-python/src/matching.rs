@@ -2,29 +2,32 @@
 use crate::arrays;
 use crate::errors::{self, Signals, invalid};
 use crate::own::OwnStage;
-use crate::results::{Match, StrainBetween};
+use crate::results::{Match, StrainBetween, StrainGrid};
 use nalgebra::{Matrix3, Point};
 use ndarray::{Array2, ArrayView2};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
 use pyo3::types::PyDict;
 use std::str::FromStr;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use tactile_imaging::core::statistics::quantile_95;
 use tactile_imaging::elasticity::kinematics::StrainQuantities;
 use tactile_imaging::elasticity::strain::{GreenLagrange, StrainMeasure};
 use tactile_imaging::matching::labelling::{Compatibility, LengthMaximum, Neighbourhood};
 use tactile_imaging::matching::{
-    AnnealedSoftassign, CoherentPointDrift, FittedTransformation, LinearAssignment, MatchError,
-    Matching, NearestNeighbour, Normalization, Outliers, PointMatcher, RelaxationLabelling,
-    Rotation, SoftassignWorkspace, Transformation,
+    AnnealedSoftassign, CoherentPointDrift, FittedTransformation, LinearAssignment, Matching,
+    NearestNeighbour, Normalization, Outliers, PointMatcher, RelaxationLabelling, Rotation,
+    Transformation,
 };
 use tactile_imaging::pipeline::MatcherChoice;
-use tactile_imaging::tps::LocalField;
-use tactile_imaging::{StrainBetweenOptions, strain_between as strain_of_sets};
+use tactile_imaging::{
+    StrainAt, StrainBetween as Strained, StrainBetweenError, StrainBetweenOptions, StrainSeries,
+    strain_between as strain_of_sets,
+};
 
-/// Share of the noise below which warped points are the partners themselves.
-const SNAPPED: f64 = 1e-3;
+/// Most places of a grid: 600 MB.
+const MOST_PLACES: f64 = 4e6;
 
 /// A matcher as the caller gave it: read once, made for the plane or for space.
 pub(crate) enum Matcher {
@@ -141,14 +144,6 @@ impl Matcher {
             Self::Own(matcher) => Box::new(matcher),
         }
     }
-
-    /// For a call that a person waits for.
-    fn interruptible<const D: usize>(self) -> Box<dyn PointMatcher<D> + Send + Sync> {
-        match self {
-            Self::Annealed(matcher) => Box::new(Interruptible(matcher)),
-            other => other.boxed(),
-        }
-    }
 }
 
 fn softassign(
@@ -258,49 +253,6 @@ fn labelling(options: &mut Options<'_>) -> PyResult<RelaxationLabelling> {
     Ok(matcher)
 }
 
-/// The default matcher, which `KeyboardInterrupt` ends.
-struct Interruptible(AnnealedSoftassign);
-
-impl<const D: usize> PointMatcher<D> for Interruptible {
-    fn match_points(
-        &self,
-        model: &[Point<f64, D>],
-        target: &[Point<f64, D>],
-    ) -> Result<Matching<D>, MatchError> {
-        let (mut workspace, mut signals) = (SoftassignWorkspace::default(), Signals::new());
-        let watch = |_, _| signals.check();
-        let found = (self.0).match_points_with(&mut workspace, model, target, watch)?;
-        let found = found.to_matching(model);
-        signals.finish().map_err(MatchError::custom)?;
-        Ok(found)
-    }
-}
-
-/// Puts the warped points of a large set, which the matcher leaves on their noisy partners, where the
-/// smooth field of the pairs has them, as those of a small one are.
-fn smooth<const D: usize>(
-    found: &mut Matching<D>,
-    model: &[Point<f64, D>],
-    target: &[Point<f64, D>],
-) {
-    let report = &found.report;
-    if found.transformation.is_some() || report.residual > SNAPPED * report.sigma {
-        return;
-    }
-    let pairs = found.pairs().map(|(i, j, _)| (model[i], target[j]));
-    let (sources, images): (Vec<_>, Vec<_>) = pairs.unzip();
-    let Ok(field) = LocalField::fit(&sources, &images) else {
-        return;
-    };
-    let moved = model.iter().zip(field.at(model));
-    found.warped = moved.map(|(point, at)| point + at.displacement).collect();
-    let misses = found
-        .pairs()
-        .map(|(i, j, _)| (found.warped[i] - target[j]).norm_squared());
-    let (squares, count) = misses.fold((0.0, 0), |(sum, n), miss| (sum + miss, n + 1));
-    found.report.residual = (squares / f64::from(count.max(1))).sqrt();
-}
-
 fn homogeneous<const D: usize>(map: &FittedTransformation<D>) -> Array2<f64> {
     Array2::from_shape_fn((D + 1, D + 1), |(row, column)| {
         match (row < D, column < D) {
@@ -331,10 +283,8 @@ pub(crate) fn answer<const D: usize>(
         ),
         assignment: arrays::kept_vector(py, found.assignment.iter().map(row).collect()),
         confidence: arrays::kept_vector(py, found.confidence.clone()),
-        warped: arrays::kept(py, arrays::rows(&found.warped)),
         pairs: arrays::kept(py, rows_of_pairs(&pairs)),
         sigma: report.sigma,
-        residual: report.residual,
         iterations: report.iterations,
         rotation: map.map(|map| map.rotation.as_slice().to_vec()),
         rotation_error: map.map(|map| map.rotation_error.as_slice().to_vec()),
@@ -346,6 +296,7 @@ pub(crate) fn answer<const D: usize>(
         flags,
         model: arrays::kept(py, arrays::rows(model)),
         target: arrays::kept(py, arrays::rows(target)),
+        warped_once: PyOnceLock::new(),
     }
 }
 
@@ -369,9 +320,9 @@ fn rows_of_pairs(pairs: &[(usize, usize)]) -> Array2<i64> {
 ///     or a tuple of these rows and a confidence for each.
 /// **options
 ///     Of "annealed-softassign": `rotation` ("limited", "any"), `outliers` ("both", "model",
-///     "target", "none"), `transformation` ("non-rigid", "similarity", "rigid"), `outlier_ratio`
-///     (0.1), `max_iterations` (200). Of "coherent-point-drift": `motion` ("rigid", "similarity",
-///     "affine", "non-rigid"), `beta` (2), `lambda_` (3), `rank`, `outlier_weight` (0.1),
+///     "target", "none"), `transformation` ("smooth", "affine", "similarity", "rigid"),
+///     `outlier_ratio` (0.1), `largest_motion`, `max_iterations` (200). Of
+///     "coherent-point-drift": `beta` (2), `lambda_` (3), `rank`, `outlier_weight` (0.1),
 ///     `tolerance`, `max_iterations`, `normalization` ("each", "model", "off"). Of
 ///     "relaxation-labelling": `neighbours`, `compatibility`, `length_maximum`, `temperature`,
 ///     `slack`, `smoothing`, `candidates`, `max_iterations`. Of the other two: `max_distance`.
@@ -414,18 +365,19 @@ fn matched<const D: usize>(
     sets: [ArrayView2<'_, f64>; 2],
     matcher: Matcher,
 ) -> PyResult<Match> {
-    let matcher = matcher.interruptible::<D>();
+    let matcher = matcher.boxed::<D>();
     let [model, target] = sets.map(arrays::points);
-    let found = py.detach(|| {
-        let mut found = matcher.match_points(&model, &target)?;
-        smooth(&mut found, &model, &target);
-        Ok::<_, MatchError>(found)
-    });
-    let found = found.map_err(errors::refused)?;
-    Ok(answer(py, &found, [&model, &target]))
+    let found = Signals::during(py, |signals| {
+        matcher.match_watched(&model, &target, &mut || signals.check())
+    })?;
+    Ok(answer(
+        py,
+        &found.map_err(errors::refused)?,
+        [&model, &target],
+    ))
 }
 
-/// Strain of a point set on its way to another: match, robust spline, Green-Lagrange strain.
+/// Strain of a point set on its way to another: match, local field, Green-Lagrange strain.
 ///
 /// Parameters
 /// ----------
@@ -443,6 +395,9 @@ fn matched<const D: usize>(
 ///     tracker. Nothing is matched, and rows with NaN are skipped.
 /// with_doubtful_pairs : bool
 ///     Whether pairs that are not to be relied on give a strain with a flag instead of an error.
+/// grid : float or (k, d) array
+///     Spacing of a grid over the box of `before`, or places: displacement and strain there are
+///     `grid` of the result.
 ///
 /// Returns
 /// -------
@@ -452,12 +407,13 @@ fn matched<const D: usize>(
 /// Raises
 /// ------
 /// ValueError
-///     As `match_points`, and fewer than 16 matched points.
+///     As `match_points`, and too few matched points.
 /// TactileError
 ///     Doubtful pairs, or no smooth deformation.
 #[pyfunction]
 #[pyo3(signature = (
-    before, after, matcher=None, *, measure=None, paired=false, with_doubtful_pairs=false, **options
+    before, after, matcher=None, *, measure=None, paired=false, with_doubtful_pairs=false,
+    grid=None, **options
 ))]
 #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
 pub(crate) fn strain_between(
@@ -468,6 +424,7 @@ pub(crate) fn strain_between(
     measure: Option<&Bound<'_, PyAny>>,
     paired: bool,
     with_doubtful_pairs: bool,
+    grid: Option<&Bound<'_, PyAny>>,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<StrainBetween> {
     if paired && (matcher.is_some() || options.is_some_and(|options| !options.is_empty())) {
@@ -480,41 +437,223 @@ pub(crate) fn strain_between(
         arrays::matrix("after", after)?,
     ];
     let sets = sets.each_ref().map(|set| set.as_array());
-    let matcher = Matcher::new(matcher, options, AnnealedSoftassign::default())?;
+    let work = Work::new(matcher, options, measure, with_doubtful_pairs)?;
     match arrays::dimension(["before", "after"], sets)? {
-        2 => strained::<2>(py, sets, matcher, measure, [paired, with_doubtful_pairs]),
-        _ => strained::<3>(py, sets, matcher, measure, [paired, with_doubtful_pairs]),
+        2 => work.between::<2>(py, sets, paired, grid),
+        _ => work.between::<3>(py, sets, paired, grid),
     }
 }
 
-fn strained<const D: usize>(
+/// Strain of every frame of a series since the first: points are followed from frame to frame.
+///
+/// Parameters
+/// ----------
+/// frames : sequence of (n, 2) or (n, 3) arrays
+///     Points in any unit. Numbers of points may differ.
+/// matcher, measure, with_doubtful_pairs, **options
+///     As those of `strain_between`.
+///
+/// Returns
+/// -------
+/// list of StrainBetween or None
+///     Of every frame but the first. None if too few points of the first frame are left, or their
+///     pairs are doubtful.
+///
+/// Raises
+/// ------
+/// ValueError, TactileError
+///     As `strain_between`, of two frames that follow each other.
+#[pyfunction]
+#[pyo3(signature = (frames, matcher=None, *, measure=None, with_doubtful_pairs=false, **options))]
+pub(crate) fn strain_series(
     py: Python<'_>,
-    sets: [ArrayView2<'_, f64>; 2],
-    matcher: Matcher,
+    frames: Vec<Bound<'_, PyAny>>,
+    matcher: Option<&Bound<'_, PyAny>>,
     measure: Option<&Bound<'_, PyAny>>,
-    [paired, with_doubtful_pairs]: [bool; 2],
-) -> PyResult<StrainBetween> {
-    let matcher = matcher.interruptible::<D>();
-    let mut options = StrainBetweenOptions::<D>::default().with_matcher(matcher);
-    let measure: Arc<dyn StrainMeasure + Send + Sync> = match measure {
-        Some(given) => Arc::from(crate::pipeline::strain_measure("measure", given)?),
-        None => Arc::new(GreenLagrange),
+    with_doubtful_pairs: bool,
+    options: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Vec<Option<StrainBetween>>> {
+    let frames = frames.iter().enumerate();
+    let frames = frames.map(|(k, frame)| arrays::matrix(&format!("frame {k}"), frame));
+    let frames = frames.collect::<PyResult<Vec<_>>>()?;
+    let sets: Vec<_> = frames.iter().map(|frame| frame.as_array()).collect();
+    let work = Work::new(matcher, options, measure, with_doubtful_pairs)?;
+    let Some((&first, rest)) = sets.split_first() else {
+        return Err(invalid("frames must be one set of points at least"));
     };
-    options = options.with_measure(Arc::clone(&measure));
-    if with_doubtful_pairs {
-        options = options.with_doubtful_pairs();
+    let mut axes = arrays::dimension(["frame 0", "frame 0"], [first; 2])?;
+    for &next in rest {
+        axes = arrays::dimension(["all frames", "frame 0"], [next, first])?;
     }
-    let found = py.detach(|| {
-        let [before, after] = sets.map(arrays::points);
-        let found = if paired {
-            tactile_imaging::StrainBetween::of_known_pairs(&before, &after, &options)
-        } else {
-            strain_of_sets(&before, &after, &options)
-        }?;
-        let read = found.kinematics(&*measure);
-        Ok((found, read))
-    });
-    let (found, read) = found.map_err(errors::strain_between)?;
+    match axes {
+        2 => work.series::<2>(py, first, rest),
+        _ => work.series::<3>(py, first, rest),
+    }
+}
+
+/// What strains of points take.
+struct Work {
+    matcher: Matcher,
+    measure: Arc<dyn StrainMeasure + Send + Sync>,
+    with_doubtful_pairs: bool,
+    signals: Arc<Mutex<Signals>>,
+}
+
+impl Work {
+    fn new(
+        matcher: Option<&Bound<'_, PyAny>>,
+        options: Option<&Bound<'_, PyDict>>,
+        measure: Option<&Bound<'_, PyAny>>,
+        with_doubtful_pairs: bool,
+    ) -> PyResult<Self> {
+        Ok(Self {
+            matcher: Matcher::new(matcher, options, AnnealedSoftassign::default())?,
+            measure: match measure {
+                Some(given) => Arc::from(crate::pipeline::strain_measure("measure", given)?),
+                None => Arc::new(GreenLagrange),
+            },
+            with_doubtful_pairs,
+            signals: Arc::new(Mutex::new(Signals::new())),
+        })
+    }
+
+    /// Computes with the options, without the interpreter's lock.
+    fn run<const D: usize, T: Send>(
+        self,
+        py: Python<'_>,
+        compute: impl Send + FnOnce(StrainBetweenOptions<D>) -> Result<T, StrainBetweenError>,
+    ) -> PyResult<T> {
+        let asked = Arc::clone(&self.signals);
+        let mut options = StrainBetweenOptions::<D>::default()
+            .with_matcher(self.matcher.boxed::<D>())
+            .with_measure(self.measure)
+            .with_watch(move || {
+                asked
+                    .lock()
+                    .unwrap_or_else(|broken| broken.into_inner())
+                    .check()
+            });
+        if self.with_doubtful_pairs {
+            options = options.with_doubtful_pairs();
+        }
+        let found = py.detach(|| compute(options));
+        let mut signals = self
+            .signals
+            .lock()
+            .unwrap_or_else(|broken| broken.into_inner());
+        signals.finish()?;
+        found.map_err(errors::strain_between)
+    }
+
+    fn between<const D: usize>(
+        self,
+        py: Python<'_>,
+        sets: [ArrayView2<'_, f64>; 2],
+        paired: bool,
+        grid: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<StrainBetween> {
+        let measure = Arc::clone(&self.measure);
+        let [before, after] = sets.map(arrays::points::<D>);
+        let (counts, places) = grid.map_or(Ok(Default::default()), |grid| places(grid, &before))?;
+        let (found, on_grid) = self.run(py, |options| {
+            let found = match paired {
+                true => Strained::of_known_pairs(&before, &after, &options),
+                false => strain_of_sets(&before, &after, &options),
+            }?;
+            let on_grid = found.at(&places, &*measure)?;
+            Ok((found, on_grid))
+        })?;
+        let grid = grid.map(|_| grid_result(py, counts, &places, &on_grid));
+        result(
+            py,
+            &found,
+            &*measure,
+            grid.map(|grid| Py::new(py, grid)).transpose()?,
+        )
+    }
+
+    fn series<const D: usize>(
+        self,
+        py: Python<'_>,
+        first: ArrayView2<'_, f64>,
+        rest: &[ArrayView2<'_, f64>],
+    ) -> PyResult<Vec<Option<StrainBetween>>> {
+        let measure = Arc::clone(&self.measure);
+        let found = self.run(py, |options| {
+            let mut series = StrainSeries::<D>::new(&arrays::points(first), options);
+            let next = |set: &ArrayView2<'_, f64>| Ok(series.push(&arrays::points(*set))?.total);
+            rest.iter()
+                .map(next)
+                .collect::<Result<Vec<_>, StrainBetweenError>>()
+        })?;
+        let found = found.iter().map(|found| match found {
+            Ok(found) => result(py, found, &*measure, None).map(Some),
+            Err(_) => Ok(None),
+        });
+        found.collect()
+    }
+}
+
+/// The places of a grid of this spacing over the box of points, the first axis fastest, and their
+/// numbers along the axes. None of these for places that are given.
+fn places<const D: usize>(
+    grid: &Bound<'_, PyAny>,
+    points: &[Point<f64, D>],
+) -> PyResult<(Vec<usize>, Vec<Point<f64, D>>)> {
+    let Ok(spacing) = grid.extract::<f64>() else {
+        let places = arrays::columns::<D>("grid", grid)?;
+        return Ok((Vec::new(), places.into_iter().map(Point::from).collect()));
+    };
+    let mut finite = points.iter().filter(|p| p.iter().all(|x| x.is_finite()));
+    let start = finite.next().copied().unwrap_or_else(Point::origin);
+    let (low, high) = finite.fold((start, start), |(low, high), p| (low.inf(p), high.sup(p)));
+    let counts: [f64; D] = std::array::from_fn(|a| ((high[a] - low[a]) / spacing).floor() + 1.0);
+    if !(spacing > 0.0 && counts.iter().product::<f64>() <= MOST_PLACES) {
+        return Err(invalid(format!(
+            "grid must be a positive spacing that gives {MOST_PLACES:.0e} places at most, \
+             found {spacing}"
+        )));
+    }
+    let counts = counts.map(|count| count as usize);
+    let place = |mut k: usize| {
+        let mut place = low;
+        for a in 0..D {
+            place[a] += spacing * (k % counts[a]) as f64;
+            k /= counts[a];
+        }
+        place
+    };
+    let places = (0..counts.iter().product()).map(place).collect();
+    Ok((counts.to_vec(), places))
+}
+
+fn grid_result<const D: usize>(
+    py: Python<'_>,
+    counts: Vec<usize>,
+    places: &[Point<f64, D>],
+    found: &[StrainAt<D>],
+) -> StrainGrid {
+    let tensors = |of: fn(&StrainAt<D>) -> Matrix3<f64>| {
+        arrays::kept_tensors(py, &found.iter().map(of).collect::<Vec<_>>())
+    };
+    let displaced = |(i, k): (usize, usize)| found[i].displacement[k];
+    StrainGrid {
+        text: format!("{} places", places.len()),
+        counts,
+        points: arrays::kept(py, arrays::rows(places)),
+        displacements: arrays::kept(py, Array2::from_shape_fn((found.len(), D), displaced)),
+        strains: tensors(|at| at.strain),
+        standard_errors: tensors(|at| at.standard_error),
+    }
+}
+
+fn result<const D: usize>(
+    py: Python<'_>,
+    found: &Strained<D>,
+    measure: &dyn StrainMeasure,
+    grid: Option<Py<StrainGrid>>,
+) -> PyResult<StrainBetween> {
+    let read = found.kinematics(measure);
     let (mean, error) = (found.summary.mean, found.standard_error);
     let half = error * quantile_95(Some(found.degrees_of_freedom as f64));
     let displaced = |(i, k): (usize, usize)| found.displacements[i][k];
@@ -534,6 +673,7 @@ fn strained<const D: usize>(
             Array2::from_shape_fn((count, 2), |(i, k)| of(&read[i])[k]),
         )
     };
+    let before: Vec<_> = found.pairs.iter().map(|pair| pair[0]).collect();
     Ok(StrainBetween {
         text: format!("{count} points, {}", tensor_text(&mean, &error)),
         value: arrays::kept_tensor(py, &mean),
@@ -543,6 +683,7 @@ fn strained<const D: usize>(
             arrays::kept_tensor(py, &(mean + half)),
         ),
         pairs: arrays::kept(py, rows_of_pairs(&found.rows)),
+        points: arrays::kept(py, arrays::rows(&before)),
         displacements: arrays::kept(py, Array2::from_shape_fn((count, D), displaced)),
         strains: arrays::kept_tensors(py, &found.strains),
         standard_errors: arrays::kept_tensors(py, &found.standard_errors),
@@ -556,6 +697,7 @@ fn strained<const D: usize>(
         von_mises: with_error(|at| [at.equivalent, at.equivalent_error]),
         sigma: found.sigma,
         flags: found.doubt.iter().map(ToString::to_string).collect(),
+        grid,
     })
 }
 

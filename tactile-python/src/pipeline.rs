@@ -99,7 +99,25 @@ impl Object {
     }
 
     fn __repr__(&self) -> String {
-        format!("Object.{:?}", self.0)
+        use rust::Object as Kind;
+        let ratio = self.0.poisson_ratio();
+        let (kind, sizes) = match self.0 {
+            Kind::Sphere { radius_m, .. } => ("sphere", format!("radius={radius_m}, ")),
+            Kind::Block { .. } => ("block", String::new()),
+            Kind::Cylinder { .. } => ("cylinder", String::new()),
+            Kind::FlatPunch { radius_m, .. } => ("flat_punch", format!("radius={radius_m}, ")),
+            Kind::Cone { half_angle_rad, .. } => ("cone", format!("half_angle={half_angle_rad}, ")),
+            Kind::Layer {
+                indenter_radius_m,
+                thickness_m,
+                ..
+            } => (
+                "layer",
+                format!("indenter_radius={indenter_radius_m}, thickness={thickness_m}, "),
+            ),
+            _ => ("unknown", String::new()),
+        };
+        format!("Object.{kind}({sizes}poisson_ratio={ratio})")
     }
 }
 
@@ -318,8 +336,8 @@ impl Pipeline {
 
     fn __repr__(&self) -> String {
         let settings = self.pipeline.settings();
-        let points = settings.control_points;
-        format!("Pipeline({:?}, {points} control points)", settings.object)
+        let (object, points) = (Object(settings.object).__repr__(), settings.control_points);
+        format!("Pipeline({object}, control_points={points})")
     }
 }
 

@@ -3,7 +3,7 @@ use crate::arrays;
 use crate::errors;
 use crate::matching::{answer, tensor_text};
 use crate::pipeline::Pipeline;
-use crate::results::{Contact, Estimate, Match, Modulus, Strain, Surface, ends};
+use crate::results::{Contact, Estimate, Match, Modulus, Strain, Surface, ends, of_values};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
@@ -16,6 +16,7 @@ use tactile_files::scene::Scene;
 use tactile_imaging as rust;
 use tactile_imaging::core::Estimate as CoreEstimate;
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
+use tactile_imaging::force::ForceError;
 use tactile_imaging::pipeline::{ContactReading, ContactSurface, Flag, PairStrain, PipelineError};
 
 /// Values and their standard errors.
@@ -23,7 +24,8 @@ type ValuesAndErrors<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>
 
 /// Frames at one or more loads. Nothing is computed before it is asked for, and all of it once.
 ///
-/// Frames are counted from zero. Threads may share a press, and the interpreter's lock is free
+/// Frames are counted from zero, also in sentences, from the end if negative, and `press[i]` is one
+/// with its results. Threads may share a press, and the interpreter's lock is free
 /// while it computes: a frame that another thread adds meanwhile waits.
 ///
 /// Parameters
@@ -152,9 +154,23 @@ impl Press {
         time: Option<f64>,
     ) -> PyResult<usize> {
         let frame = arrays::owned(arrays::frame("frame", frame)?.as_array());
+        if gauge.is_some_and(|force_n| {
+            !(force_n.is_finite() && (0.0..f64::INFINITY).contains(&gauge_error))
+        }) {
+            return Err(errors::invalid(format!(
+                "gauge and gauge_error must be finite and the error not negative, found {gauge:?} \
+                 and {gauge_error}"
+            )));
+        }
         let gauge = gauge.map(|force_n| CoreEstimate::new(force_n, gauge_error));
         self.alone(py, |press| {
             let mut press = press.write().unwrap_or_else(|broken| broken.into_inner());
+            let (frame_number, expected) = (press.frames(), press.reference().image().dim());
+            if frame.dim() != expected {
+                let (found, frame) = (frame.dim(), frame_number);
+                let source = ForceError::SizeMismatch { expected, found };
+                return Err(PipelineError::Contact { frame, source });
+            }
             let number = press.add_gauged_frame(frame, gauge);
             if let Some(time_s) = time {
                 press.set_time_s(number, time_s)?;
@@ -172,17 +188,29 @@ impl Press {
     }
 
     /// A frame as it was given, (rows, columns) of uint8.
-    fn image<'py>(&self, py: Python<'py>, frame: usize) -> PyResult<Bound<'py, PyArray2<u8>>> {
-        let image = self.ask(py, |press| Ok(press.image(frame)?.into_owned()))?;
+    fn image<'py>(&self, py: Python<'py>, frame: i64) -> PyResult<Bound<'py, PyArray2<u8>>> {
+        let image = self.ask(py, |press| {
+            Ok(press.image(nth(press, frame)?)?.into_owned())
+        })?;
         Ok(PyArray2::from_owned_array(py, image))
     }
 
     /// Force, radius and centroid of a frame, or None where nothing touches.
-    fn contact(&self, py: Python<'_>, frame: usize) -> PyResult<Option<Contact>> {
-        let reading = self.ask(py, |press| Ok(press.contact(frame)?.copied()))?;
-        reading
-            .map(|reading| contact(py, frame, &reading))
+    fn contact(&self, py: Python<'_>, frame: i64) -> PyResult<Option<Contact>> {
+        let found = self.ask(py, |press| {
+            let frame = nth(press, frame)?;
+            let reading = press.contact(frame)?.copied();
+            Ok(reading.map(|reading| (frame, reading)))
+        })?;
+        found
+            .map(|(frame, reading)| contact(py, frame, &reading))
             .transpose()
+    }
+
+    /// A frame with its results, counted from the end if its number is negative.
+    fn __getitem__<'py>(slf: &Bound<'py, Self>, frame: i64) -> PyResult<Bound<'py, PyAny>> {
+        let number = slf.get().ask(slf.py(), |press| nth(press, frame))?;
+        of_values(slf.py(), "PressFrame", (slf, number))
     }
 
     /// Depths to which a ball presses the guide, by the law of its layers.
@@ -201,10 +229,12 @@ impl Press {
     fn guide_depression<'py>(
         &self,
         py: Python<'py>,
-        frame: usize,
+        frame: i64,
         distances: Vec<f64>,
     ) -> PyResult<Option<ValuesAndErrors<'py>>> {
-        let depths = self.ask(py, |press| press.guide_depression_m(frame, &distances))?;
+        let depths = self.ask(py, |press| {
+            press.guide_depression_m(nth(press, frame)?, &distances)
+        })?;
         Ok(depths.map(|depths| {
             let values = depths.iter().map(|depth| depth.value);
             let errors = depths.iter().map(|depth| depth.standard_error);
@@ -216,8 +246,8 @@ impl Press {
     }
 
     /// The reconstructed surface of a frame.
-    fn surface(&self, py: Python<'_>, frame: usize) -> PyResult<Surface> {
-        let surface = self.ask(py, |press| press.surface(frame).cloned())?;
+    fn surface(&self, py: Python<'_>, frame: i64) -> PyResult<Surface> {
+        let surface = self.ask(py, |press| press.surface(nth(press, frame)?).cloned())?;
         Ok(surface_result(py, surface))
     }
 
@@ -225,15 +255,18 @@ impl Press {
     fn control_points<'py>(
         &self,
         py: Python<'py>,
-        frame: usize,
+        frame: i64,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let points = self.ask(py, |press| press.control_points(frame).map(arrays::rows))?;
+        let points = self.ask(py, |press| {
+            press.control_points(nth(press, frame)?).map(arrays::rows)
+        })?;
         Ok(PyArray2::from_owned_array(py, points))
     }
 
     /// The match of the first frame's control points with those of a frame.
-    fn matching(&self, py: Python<'_>, frame: usize) -> PyResult<Match> {
+    fn matching(&self, py: Python<'_>, frame: i64) -> PyResult<Match> {
         self.ask(py, |press| {
+            let frame = nth(press, frame)?;
             let sets = [press.control_points(0)?, press.control_points(frame)?];
             let found = press.matching(frame)?;
             Ok(Python::attach(|py| answer(py, found, sets)))
@@ -241,8 +274,8 @@ impl Press {
     }
 
     /// Mean strain between the first frame and a frame.
-    fn strain(&self, py: Python<'_>, frame: usize) -> PyResult<Strain> {
-        let strain = self.ask(py, |press| press.strain(frame).cloned())?;
+    fn strain(&self, py: Python<'_>, frame: i64) -> PyResult<Strain> {
+        let strain = self.ask(py, |press| press.strain(nth(press, frame)?).cloned())?;
         Ok(strain_result(py, &strain))
     }
 
@@ -301,6 +334,20 @@ impl Press {
     }
 }
 
+/// The frame of a number that counts from the end if it is negative.
+fn nth(press: &rust::Press<'static>, number: i64) -> Result<usize, PipelineError> {
+    let frames = press.frames();
+    let from = if number < 0 { frames as i64 } else { 0 };
+    let frame = usize::try_from(number + from)
+        .ok()
+        .filter(|&frame| frame < frames);
+    let missing = PipelineError::NoSuchFrame {
+        frame: number.unsigned_abs() as usize,
+        frames,
+    };
+    frame.ok_or(missing)
+}
+
 /// A press that owns its frames.
 fn press_of_scene(path: PathBuf) -> Result<rust::Press<'static>, FileError> {
     let scene = Scene::read(path)?;
@@ -333,7 +380,10 @@ fn contact(py: Python<'_>, frame: usize, reading: &ContactReading) -> PyResult<C
         y: estimate(y)?,
         area: reading.area_m2,
         touches_edge: reading.touches_edge,
-        flags: reading.flags(frame).map(|flag| flag.to_string()).collect(),
+        flags: reading
+            .flags(frame)
+            .map(|flag| errors::from_zero(&flag.to_string()))
+            .collect(),
     })
 }
 
@@ -370,7 +420,11 @@ pub(crate) fn modulus(estimate: &ModulusEstimate) -> Modulus {
         standard_error: estimate.standard_error_pa,
         interval_95: ends(estimate.interval_95),
         estimator: estimate.estimator.to_string(),
-        flags: estimate.warnings.iter().map(ToString::to_string).collect(),
+        flags: estimate
+            .warnings
+            .iter()
+            .map(|warning| errors::from_zero(&warning.to_string()))
+            .collect(),
     }
 }
 

@@ -3,9 +3,11 @@ use crate::arrays::{self, Matrix, Tensors, Vector};
 use crate::errors::{failed, invalid};
 use nalgebra::{Point, SMatrix, SVector};
 use ndarray::{Array2, ArrayView2};
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
+use std::path::PathBuf;
 use tactile_imaging::core::{Estimate as CoreEstimate, Interval};
 use tactile_imaging::tps::{LocalField, TpsError};
 
@@ -41,7 +43,9 @@ pub(crate) fn to_html(result: &Bound<'_, PyAny>, names: &[&str]) -> PyResult<Str
 /// A frozen class of fields with what every result has.
 macro_rules! result {
     (
-        $(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $field:ident: $kind:ty,)+ }
+        $(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $field:ident: $kind:ty,)+
+            $(; [$($computed:ident),*] $once:ident: $held:ty)?
+        }
         $($methods:tt)*
     ) => {
         $(#[$meta])*
@@ -49,6 +53,7 @@ macro_rules! result {
         pub(crate) struct $name {
             pub text: String,
             $($(#[$doc])* #[pyo3(get)] pub $field: $kind,)+
+            $(pub $once: $held,)?
         }
 
         #[pymethods]
@@ -59,6 +64,12 @@ macro_rules! result {
 
             fn _repr_html_(slf: &Bound<'_, Self>) -> PyResult<String> {
                 to_html(slf.as_any(), &[$(stringify!($field)),+])
+            }
+
+            /// Names of what is worked out of the fields when it is asked for.
+            #[classattr]
+            fn _computed() -> Vec<&'static str> {
+                vec![$($(stringify!($computed)),*)?]
             }
 
             #[classattr]
@@ -75,7 +86,11 @@ macro_rules! result {
             fn _restored(text: String, fields: Vec<Bound<'_, PyAny>>) -> PyResult<Self> {
                 let mut fields = fields.into_iter();
                 let mut next = || fields.next().ok_or_else(|| invalid("a field is missing"));
-                Ok(Self { text, $($field: next()?.extract::<$kind>()?,)+ })
+                Ok(Self {
+                    text,
+                    $($field: next()?.extract::<$kind>()?,)+
+                    $($once: <$held>::new(),)?
+                })
             }
 
             /// The fields by name. Plain ones are numbers, text and lists alone.
@@ -268,6 +283,36 @@ result! {
         /// Place of the first height in metres, x and y.
         origin: (f64, f64),
     }
+
+    /// Places of the columns along x in metres.
+    #[getter]
+    fn x<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let place = |k| self.origin.0 + self.pixel_size.0 * k as f64;
+        PyArray1::from_iter(py, (0..self.heights.bind(py).shape()[1]).map(place))
+    }
+
+    /// Places of the rows along y in metres.
+    #[getter]
+    fn y<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let place = |k| self.origin.1 + self.pixel_size.1 * k as f64;
+        PyArray1::from_iter(py, (0..self.heights.bind(py).shape()[0]).map(place))
+    }
+
+    /// The heights.
+    #[pyo3(signature = (dtype=None, copy=None))]
+    fn __array__<'py>(
+        &self,
+        py: Python<'py>,
+        dtype: Option<&Bound<'py, PyAny>>,
+        copy: Option<bool>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let heights = self.heights.bind(py).as_any();
+        match (dtype, copy) {
+            (Some(dtype), _) => heights.call_method1("astype", (dtype,)),
+            (None, Some(true)) => heights.call_method0("copy"),
+            _ => Ok(heights.clone()),
+        }
+    }
 }
 
 result! {
@@ -302,6 +347,8 @@ result! {
         interval_95: (Matrix<f64>, Matrix<f64>),
         /// Rows of the matched points, before and after, (n, 2).
         pairs: Matrix<i64>,
+        /// The matched points before, (n, d).
+        points: Matrix<f64>,
         /// Displacement of every matched point by the smoothed deformation, (n, d).
         displacements: Matrix<f64>,
         /// Strain at every matched point, (n, 3, 3).
@@ -329,6 +376,55 @@ result! {
         sigma: f64,
         /// Why the pairs are not to be relied on, a sentence each.
         flags: Vec<String>,
+        /// Displacement and strain on a grid, where one was asked for.
+        grid: Option<Py<StrainGrid>>,
+    }
+
+    /// Writes displacement and strain of the grid, or of the matched points where there is none, in
+    /// the legacy format of VTK (ParaView).
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or PathLike
+    fn to_vtk(slf: &Bound<'_, Self>, path: PathBuf) -> PyResult<()> {
+        of_values(slf.py(), "to_vtk", (slf, path)).map(|_| ())
+    }
+
+    /// Draws the displacements, and a component of the strain at the points.
+    ///
+    /// Parameters
+    /// ----------
+    /// row, column : int
+    ///     The component.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.figure.Figure
+    ///
+    /// Raises
+    /// ------
+    /// ImportError
+    ///     matplotlib is not installed.
+    #[pyo3(signature = (row=0, column=0))]
+    fn plot<'py>(slf: &Bound<'py, Self>, row: usize, column: usize) -> PyResult<Bound<'py, PyAny>> {
+        let plots = slf.py().import("tactile_imaging._plot")?;
+        plots.call_method1("plot_strain", (slf, row, column))
+    }
+}
+
+result! {
+    /// Displacement and strain at places.
+    StrainGrid {
+        /// The places, (k, d), the first axis fastest.
+        points: Matrix<f64>,
+        /// Number of places along each axis of a grid. Nothing of places that were given.
+        counts: Vec<usize>,
+        /// Displacements, (k, d).
+        displacements: Matrix<f64>,
+        /// Strains, (k, 3, 3), NaN where the deformation folds.
+        strains: Tensors,
+        /// Their standard errors, (k, 3, 3).
+        standard_errors: Tensors,
     }
 }
 
@@ -342,14 +438,10 @@ result! {
         assignment: Vector<i64>,
         /// Probability that each of these is right, (n,).
         confidence: Vector<f64>,
-        /// The warped model points, (n, d).
-        warped: Matrix<f64>,
         /// Rows of model and target of every pair, (k, 2).
         pairs: Matrix<i64>,
         /// Noise of one coordinate in the unit of the points.
         sigma: f64,
-        /// Root mean square distance of the warped points from their targets.
-        residual: f64,
         /// Iterations.
         iterations: usize,
         /// Of a matcher with a `transformation`: the rotation vector in radians, in the plane its
@@ -370,6 +462,51 @@ result! {
         model: Matrix<f64>,
         /// And those that they were matched to, (m, d).
         target: Matrix<f64>,
+        ; [warped, residual] warped_once: PyOnceLock<Matrix<f64>>
+    }
+
+    /// Where `transform` takes the model points, (n, d).
+    #[getter]
+    fn warped(&self, py: Python<'_>) -> PyResult<Matrix<f64>> {
+        let moved = || {
+            let model = self.model.bind(py);
+            let places = match self.pairs.bind(py).is_empty() {
+                true => model.readonly().as_array().to_owned(),
+                false => self.moved(py, model.readonly().as_array())?.0,
+            };
+            Ok::<_, PyErr>(arrays::kept(py, places))
+        };
+        Ok(self.warped_once.get_or_try_init(py, moved)?.clone_ref(py))
+    }
+
+    /// Root mean square distance of the warped points from their targets.
+    #[getter]
+    fn residual(&self, py: Python<'_>) -> PyResult<f64> {
+        let warped = self.warped(py)?;
+        let sets = [warped.bind(py).readonly(), self.target.bind(py).readonly()];
+        let [warped, target] = sets.each_ref().map(|set| set.as_array());
+        let pairs = self.pairs.bind(py).readonly();
+        let pairs = pairs.as_array();
+        let squares = pairs.rows().into_iter().map(|pair| {
+            let miss = &warped.row(pair[0] as usize) - &target.row(pair[1] as usize);
+            miss.dot(&miss)
+        });
+        Ok((squares.sum::<f64>() / pairs.nrows().max(1) as f64).sqrt())
+    }
+
+    /// Draws the points of the plane (of space as seen along z), with a line from each to its target.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.figure.Figure
+    ///
+    /// Raises
+    /// ------
+    /// ImportError
+    ///     matplotlib is not installed.
+    fn plot<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let plots = slf.py().import("tactile_imaging._plot")?;
+        plots.call_method1("plot_match", (slf,))
     }
 
     /// Where points go: by the map of a `transformation`, else by the local field of the pairs.
@@ -393,10 +530,25 @@ result! {
         points: &Bound<'py, PyAny>,
     ) -> PyResult<PlacesAndErrors<'py>> {
         let points = arrays::matrix("points", points)?;
+        let (places, errors) = self.moved(py, points.as_array())?;
+        Ok((PyArray2::from_owned_array(py, places), PyArray1::from_vec(py, errors)))
+    }
+}
+
+impl Match {
+    /// See `transform`.
+    fn moved(
+        &self,
+        py: Python<'_>,
+        view: ArrayView2<'_, f64>,
+    ) -> PyResult<(Array2<f64>, Vec<f64>)> {
         let sets = [&self.model, &self.target].map(|set| set.bind(py).readonly());
         let [model, target] = sets.each_ref().map(|set| set.as_array());
         let pairs = self.pairs.bind(py).readonly();
-        let matrix = self.matrix.as_ref().map(|matrix| matrix.bind(py).readonly());
+        let matrix = self
+            .matrix
+            .as_ref()
+            .map(|matrix| matrix.bind(py).readonly());
         let matrix = matrix.as_ref().map(|matrix| matrix.as_array());
         let set = |set: ArrayView2<'_, f64>, side: usize| {
             let rows = pairs.as_array();
@@ -406,15 +558,13 @@ result! {
         };
         let [sources, images] = [set(model, 0), set(target, 1)];
         let (sources, images) = (sources.map_err(invalid)?, images.map_err(invalid)?);
-        let view = points.as_array();
         arrays::dimension(["the model", "points"], [model, view])?;
         let noise = self.sigma;
         let found = py.detach(|| match model.ncols() {
             2 => moved::<2>([sources.view(), images.view(), view], matrix, noise),
             _ => moved::<3>([sources.view(), images.view(), view], matrix, noise),
         });
-        let (places, errors) = found.map_err(failed)?;
-        Ok((PyArray2::from_owned_array(py, places), PyArray1::from_vec(py, errors)))
+        found.map_err(failed)
     }
 }
 

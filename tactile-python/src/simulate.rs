@@ -54,6 +54,9 @@ pub(crate) fn simulate(
             )));
         }
     };
+    if coarser == 0 {
+        return Err(invalid("coarser must be 1 or more, found 0"));
+    }
     let mut options = PressOptions {
         law,
         camera: Camera::default().coarser(coarser),

@@ -14,7 +14,82 @@ def press():
     return ti.Pipeline(BALL, pairs=PAIRS, pixel_size=1e-4).press(np.zeros((20, 20), np.uint8))
 
 
+def pressed():
+    found = press()
+    for _ in range(2):
+        found.add_frame(GREY)
+    return found
+
+
+def saturated():
+    pipeline = ti.Pipeline(BALL, pairs=PAIRS, pixel_size=1e-4)
+    return ti.Session(pipeline, [GREY])
+
+
+GREY = np.zeros((20, 20), np.uint8)
+FLAT = np.array([[float(k % 6), float(k // 6)] for k in range(36)])
+MASKED = np.ma.masked_array(SQUARE, mask=SQUARE > 0.5)
+COLOUR = np.zeros((20, 20, 3), np.uint8)
+
 VALUES = [
+    lambda: ti.match_points(SQUARE, MASKED),
+    lambda: ti.match_points(SQUARE, SQUARE, largest_motion=-1.0),
+    lambda: ti.match_points(SQUARE, SQUARE, transformation="projective"),
+    lambda: ti.match_points(SQUARE, SQUARE, outliers="all"),
+    lambda: ti.match_points(SQUARE, SQUARE, "relaxation-labelling", slack=2.0),
+    lambda: ti.match_points(SQUARE, SQUARE, "relaxation-labelling", neighbours=0),
+    lambda: ti.match_points(SQUARE, SQUARE, "nearest-neighbour", max_distance=0.0),
+    lambda: ti.match_points(SQUARE * 1e200, SQUARE),
+    lambda: ti.match_points(SQUARE, SQUARE).transform(np.zeros((2, 3))),
+    lambda: ti.match_points(SQUARE, SQUARE).transform(NAN[0]),
+    lambda: ti.Match.from_dict({"assignment": [0]}),
+    lambda: ti.Estimate.from_dict({"value": "1", "standard_error": 0.1, "interval_95": (0.0, 1.0)}),
+    lambda: ti.strain_between(FLAT, FLAT[:-1], paired=True),
+    lambda: ti.strain_between(FLAT, FLAT, "nearest-neighbour", paired=True),
+    lambda: ti.strain_between(FLAT, FLAT, paired=True, grid=0.0),
+    lambda: ti.strain_between(FLAT, FLAT, paired=True, grid=np.nan),
+    lambda: ti.strain_between(FLAT, FLAT, paired=True, grid=1e-6),
+    lambda: ti.strain_between(FLAT, FLAT, paired=True, grid=np.zeros((3, 3))),
+    lambda: ti.strain_between(FLAT + np.nan, FLAT, paired=True),
+    lambda: ti.strain_series([]),
+    lambda: ti.strain_series([FLAT, np.zeros((36, 3))]),
+    lambda: ti.strain_series([FLAT, FLAT * np.inf]),
+    lambda: ti.ThinPlateSpline(SQUARE, MASKED),
+    lambda: ti.ThinPlateSpline(SQUARE, 1.0),
+    lambda: ti.ThinPlateSpline(np.zeros((4, 4)), SQUARE),
+    lambda: ti.ThinPlateSpline(SQUARE, SQUARE[:, :0]),
+    lambda: ti.ThinPlateSpline(SQUARE, SQUARE).jacobian(MASKED),
+    lambda: ti.integrate(SQUARE, MASKED),
+    lambda: ti.reconstruct(SQUARE, method="some"),
+    lambda: ti.reconstruct(SQUARE, pixel_size=-1.0),
+    lambda: ti.depth(GREY, GREY, [[0.0, 0.0]], 1e-4),
+    lambda: ti.depth(GREY, GREY[:5], PAIRS, 1e-4),
+    lambda: ti.depth(COLOUR, GREY, PAIRS, 1e-4),
+    lambda: ti.markers(GREY, GREY[:5]),
+    lambda: ti.markers(GREY, GREY.astype(float)),
+    lambda: ti.estimate_modulus([1.0, np.nan], [1e-3, 2e-3], BALL),
+    lambda: ti.hertz(1.0, np.nan, 1e5),
+    lambda: ti.simulate(youngs_modulus=0.0),
+    lambda: ti.simulate(coarser=0),
+    lambda: press().add_frame(COLOUR),
+    lambda: press().add_frame(GREY[:5]),
+    lambda: press().add_frame(np.ma.masked_array(GREY, mask=True)),
+    lambda: press().add_frame(GREY, gauge=np.nan),
+    lambda: press().add_frame(GREY, gauge=1.0, gauge_error=-1.0),
+    lambda: press().add_frame(GREY, gauge=1.0, gauge_error=np.inf),
+    lambda: press().add_frame(GREY, time=np.nan),
+    lambda: ti.Press(ti.Pipeline(BALL, pairs=PAIRS, pixel_size=1e-4), GREY[:0]),
+    lambda: ti.Pipeline(BALL, pairs=[[0.0, 0.0]], pixel_size=1e-4),
+    lambda: ti.Pipeline(BALL, pairs=np.full((3, 2), np.nan), pixel_size=1e-4),
+    lambda: ti.Pipeline(BALL, depth_table=[[0.0, 0.0], [1.0, -1.0]], pixel_size=1e-4),
+    lambda: ti.Pipeline(BALL, pairs=PAIRS, pixel_size=1e-4, gauge_error=np.nan),
+    lambda: ti.Pipeline(BALL, pairs=PAIRS, pixel_size=1e-4, estimator="none"),
+    lambda: ti.Pipeline(ti.Object.sphere(3e-3, poisson_ratio=0.6), pairs=PAIRS, pixel_size=1e-4),
+    lambda: ti.Session(ti.Pipeline(BALL, pairs=PAIRS, pixel_size=1e-4), [GREY]).push(GREY[:5]),
+    lambda: ti.GelSensor.calibrate(COLOUR, [], ball_radius=2e-3, pixel_size=1e-4),
+    lambda: ti.GelSensor.calibrate(GREY, [GREY], ball_radius=2e-3, pixel_size=1e-4),
+    lambda: ti.GelSensor.calibrate(COLOUR, [COLOUR], ball_radius=2e-3, pixel_size=1e-4, order="hsv"),
+    lambda: ti.GelSensor.load(__file__),
     lambda: ti.match_points(SQUARE, NAN),
     lambda: ti.match_points(SQUARE, SQUARE + np.inf),
     lambda: ti.match_points(SQUARE, SQUARE[:0]),
@@ -75,7 +150,33 @@ def test_a_bad_value_is_a_value_error_with_a_sentence(call):
 OTHERS = [
     (IndexError, lambda: press().contact(7)),
     (TypeError, lambda: press().contact("first")),
-    (OverflowError, lambda: press().contact(-1)),
+    (IndexError, lambda: press().contact(-1)),
+    (IndexError, lambda: pressed()[2]),
+    (IndexError, lambda: pressed()[-3]),
+    (TypeError, lambda: pressed()["0"]),
+    (TypeError, lambda: pressed()[0:1]),
+    (TypeError, lambda: pressed()[0.5]),
+    (AttributeError, lambda: pressed()[0].colour),
+    (ti.TactileError, lambda: pressed()[0].surface),
+    (ti.TactileError, lambda: pressed().strain(-1)),
+    (ti.TactileError, lambda: pressed().modulus()),
+    (ti.TactileError, lambda: saturated().push(np.full((20, 20), 255, np.uint8))),
+    (TypeError, lambda: ti.ThinPlateSpline(SQUARE)),
+    (TypeError, lambda: ti.ThinPlateSpline(SQUARE, SQUARE, degree=1)),
+    (TypeError, lambda: ti.strain_between(SQUARE, SQUARE, spline=1)),
+    (TypeError, lambda: ti.strain_series(SQUARE[0, 0])),
+    (TypeError, lambda: ti.Object.sphere()),
+    (TypeError, lambda: ti.Object.sphere("3 mm")),
+    (TypeError, lambda: ti.Object()),
+    (TypeError, lambda: ti.Match()),
+    (TypeError, lambda: ti.Pipeline(BALL, pairs=PAIRS, pixel_size=1e-4, matcher=object())),
+    (TypeError, lambda: ti.Press(BALL, GREY)),
+    (TypeError, lambda: ti.simulate(coarser="2")),
+    (TypeError, lambda: float(ti.match_points(SQUARE, SQUARE))),
+    (TypeError, lambda: hash(ti.hertz(1.0, 3e-3, 1e5))),
+    (TypeError, lambda: ti.GelSensor()),
+    (OSError, lambda: ti.GelSensor.load("absent.toml")),
+    (OSError, lambda: ti.strain_between(FLAT, FLAT, paired=True).to_vtk("absent/strain.vtk")),
     (TypeError, lambda: ti.match_points(SQUARE, SQUARE, "nearest-neighbour", motion="rigid")),
     (TypeError, lambda: ti.match_points(SQUARE, SQUARE, max_iterations=-1)),
     (TypeError, lambda: ti.match_points(SQUARE, SQUARE, matcher=3)),

@@ -89,6 +89,77 @@ def test_warped_points_are_on_the_smooth_map_at_every_size(count):
     assert 0.1 < found.residual < 0.2
 
 
+def test_strain_on_a_grid_in_a_series_and_as_a_file(tmp_path):
+    before = lattice(9)
+    frames = [before * [1 + 0.02 * k, 1.0] for k in range(4)]
+    found = ti.strain_between(before, frames[2], paired=True, grid=1.0)
+    grid = found.grid
+    assert len(grid.points) == np.prod(grid.counts) >= 64
+    # Green–Lagrange, and the displacement, of a stretch by 4 %.
+    assert np.allclose(grid.strains[:, 0, 0], (1.04**2 - 1) / 2, atol=1e-9)
+    assert np.allclose(grid.displacements, 0.04 * grid.points * [1, 0], atol=1e-9)
+    own = ti.strain_between(before, frames[2], paired=True, grid=before[:5] + 0.1)
+    assert own.grid.counts == [] and own.grid.points.shape == (5, 2)
+    assert ti.StrainBetween.from_dict(own.to_dict(plain=True)).grid.counts == []
+    for result, kind in ((found, "STRUCTURED_POINTS"), (ti.strain_between(before, frames[2], paired=True), "POLYDATA")):
+        result.to_vtk(tmp_path / "strain.vtk")
+        lines = (tmp_path / "strain.vtk").read_text().splitlines()
+        assert lines[3] == f"DATASET {kind}"
+        places = result.grid or result
+        first = lines.index("TENSORS strain double") + 1
+        tensors = np.array([line.split() for line in lines[first : first + 3 * len(places.points)]], float)
+        assert np.array_equal(tensors.reshape(-1, 3, 3), places.strains)
+        assert len(result.plot().axes) == 3
+    series = ti.strain_series(frames)
+    assert np.allclose([one.value[0, 0] for one in series], [((1 + 0.02 * k) ** 2 - 1) / 2 for k in (1, 2, 3)])
+    assert len(ti.match_points(before, frames[1]).plot().axes[0].lines) == 2 + len(before)
+
+
+def test_frames_of_a_press_are_its_items(scene):
+    press = ti.press_of(scene)
+    assert [frame.number for frame in press] == [0, 1]
+    assert press[-1].contact == press.contact(-1) == press.contact(1)
+    surface = press[0].surface
+    assert np.array_equal(np.asarray(surface), surface.heights, equal_nan=True)
+    assert surface.heights.shape == (len(surface.y), len(surface.x))
+    assert np.isclose(surface.x[1] - surface.x[0], surface.pixel_size[0])
+    assert repr(eval(repr(ti.Object.layer(1e-3, 2e-3)), {"Object": ti.Object})) == repr(ti.Object.layer(1e-3, 2e-3))
+
+
+def test_frames_have_the_same_numbers_in_calls_and_sentences(scene):
+    press = ti.press_of(scene)
+    number = press.add_frame(scene.reference)
+    with pytest.raises(ti.TactileError, match=f"^frame {number} shows no contact"):
+        press.surface(number)
+    with pytest.raises(IndexError, match="no frame 7: the press has 3"):
+        press.contact(7)
+
+
+def test_one_saturated_frame_does_not_end_a_session(scene):
+    session = ti.Session(ti.pipeline_of(scene), [scene.reference])
+    for frame in (scene.frames[0], np.full_like(scene.frames[0], 255), scene.frames[1]):
+        try:
+            session.push(frame)
+        except ti.TactileError as error:
+            assert "saturated" in str(error) and frame.min() == 255
+    alone = ti.Session(ti.pipeline_of(scene), [scene.reference])
+    for frame in scene.frames:
+        alone.push(frame)
+    assert np.isclose(session.modulus().value, alone.modulus().value, rtol=1e-9)
+
+
+def test_the_error_of_an_own_contact_is_its_own(scene):
+    class Known:
+        def measure(self, frame, reference):
+            return {"radius": (1e-3, 1e-5), "force": (0.5, 0.01), "mask": np.ones(frame.shape, bool)}
+
+    for stated, expected in ((None, 0.01), (0.12, np.hypot(0.01, 0.06))):
+        pipeline = ti.Pipeline(ti.Object.sphere(3e-3), contact=Known(), pixel_size=1e-4, coupling_error=stated)
+        press = pipeline.press(scene.reference)
+        press.add_frame(scene.frames[0])
+        assert np.isclose(press.contact(0).force.standard_error, expected, rtol=1e-12)
+
+
 def test_a_stage_that_holds_its_press_is_freed(scene):
     class Matcher:
         def match_points(self, model, target):

@@ -40,6 +40,7 @@ use crate::interpolation::spline;
 use crate::{Judgement, MatchError, Matching, StopReason, linear_assignment};
 use nalgebra::{Point, SVector};
 use relaxation::{MatchMatrix, NeighbourGraph, energy, relax};
+use std::ops::ControlFlow;
 use tactile_tps::Smoothing;
 
 /// Selects the neighbours of a point.
@@ -364,6 +365,7 @@ impl RelaxationLabelling {
         &self,
         model: &[Point<f64, D>],
         target: &[Point<f64, D>],
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Matching<D>, MatchError> {
         point_sets(model, target)?;
         let frames = [Frame::of(model), Frame::of(target)];
@@ -384,8 +386,10 @@ impl RelaxationLabelling {
             frame: frames[1],
         };
         for k in 0..self.max_iterations {
-            run.matches = relax(self, &run.warped, &run.target);
-            run.record_energy(self.neighbourhood);
+            if run.relax(self, watch).is_break() {
+                run.stop = StopReason::Cancelled;
+                break;
+            }
             let lambda = self.smoothing * 0.5_f64.powi(i32::try_from(k).unwrap_or(i32::MAX));
             let step = run.fit(Smoothing::Lambda(lambda));
             if step <= 1e-3 {
@@ -409,11 +413,17 @@ struct Run<const D: usize> {
 }
 
 impl<const D: usize> Run<D> {
-    /// Records the energy (14) of the current match matrix.
-    fn record_energy(&mut self, neighbourhood: Neighbourhood) {
-        let [x, y] =
-            [&self.warped, &self.target].map(|points| NeighbourGraph::new(points, neighbourhood));
-        self.energy.push(energy(&self.matches, &x, &y));
+    /// Computes the match matrix of the current sets and its energy (14).
+    fn relax(
+        &mut self,
+        options: &RelaxationLabelling,
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        self.matches = relax(options, &self.warped, &self.target, watch)?;
+        let graph = |points: &Vec<_>| NeighbourGraph::new(points, options.neighbourhood);
+        let [x, y] = [&self.warped, &self.target].map(graph);
+        self.energy.push(energy(&self.matches, &x, &y, watch)?);
+        ControlFlow::Continue(())
     }
 
     /// Mean partner of model point `i`, and its weight: one minus the slack.

@@ -3,6 +3,7 @@
 use super::{Compatibility, LengthMaximum, Neighbourhood, RelaxationLabelling};
 use crate::ShapeContexts;
 use nalgebra::{Point, SVector};
+use std::ops::ControlFlow;
 
 /// Maximum number of links stored between sweeps. If there are more, each sweep computes them
 /// again.
@@ -287,7 +288,8 @@ pub(super) fn energy<const D: usize>(
     m: &MatchMatrix,
     model: &NeighbourGraph<D>,
     target: &NeighbourGraph<D>,
-) -> f64 {
+    watch: &mut dyn FnMut() -> ControlFlow<()>,
+) -> ControlFlow<(), f64> {
     assert_eq!(
         (m.rows, m.columns),
         (model.points(), target.points()),
@@ -296,6 +298,7 @@ pub(super) fn energy<const D: usize>(
     let mut energy = 0.0;
     for i in 0..m.rows {
         for j in (0..m.columns).filter(|&j| m[(i, j)] > 0.0) {
+            watch()?;
             let mut kept = 0.0;
             for a in model.of(i) {
                 let row = m.row(a.to);
@@ -304,7 +307,7 @@ pub(super) fn energy<const D: usize>(
             energy += m[(i, j)] * kept;
         }
     }
-    energy
+    ControlFlow::Continue(energy)
 }
 
 /// Update (20): each model row becomes `[M_ij S_ij, M_i,slack · slack_gain]` divided by its sum.
@@ -433,7 +436,8 @@ pub(super) fn relax<const D: usize>(
     options: &RelaxationLabelling,
     model: &[Point<f64, D>],
     target: &[Point<f64, D>],
-) -> MatchMatrix {
+    watch: &mut dyn FnMut() -> ControlFlow<()>,
+) -> ControlFlow<(), MatchMatrix> {
     let graphs = [model, target].map(|points| NeighbourGraph::new(points, options.neighbourhood));
     let longest = match options.length_maximum {
         LengthMaximum::PerPair => None,
@@ -447,10 +451,10 @@ pub(super) fn relax<const D: usize>(
     if let Some(count) = options.candidates {
         keep_likeliest(&mut m, count);
     }
-    let links = Links::new(&m, &graphs, rule);
+    let links = Links::new(&m, &graphs, rule, watch)?;
     for _ in 0..options.sweeps {
         let before = m.clone();
-        let support = links.support(&m);
+        let support = links.support(&m, watch)?;
         let gain = slack_gain(&support, m.columns, options.slack);
         update(&mut m, &support, gain);
         sinkhorn(&mut m, options.sinkhorn_sweeps, 0.0);
@@ -458,7 +462,7 @@ pub(super) fn relax<const D: usize>(
             break;
         }
     }
-    m
+    ControlFlow::Continue(m)
 }
 
 /// Gain of the slack: a fraction of the best partners' support, so that it means the same for every
@@ -510,7 +514,12 @@ struct Links<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Links<'a, D> {
-    fn new(m: &MatchMatrix, graphs: &'a [NeighbourGraph<D>; 2], rule: CompatibilityRule) -> Self {
+    fn new(
+        m: &MatchMatrix,
+        graphs: &'a [NeighbourGraph<D>; 2],
+        rule: CompatibilityRule,
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> ControlFlow<(), Self> {
         assert_eq!(
             (m.rows, m.columns),
             (graphs[0].points(), graphs[1].points()),
@@ -530,21 +539,23 @@ impl<'a, const D: usize> Links<'a, D> {
             links.candidates[i].len() * offered
         });
         if products.sum::<usize>() <= 2 * MAX_STORED_LINKS {
-            links.store();
+            links.store(watch)?;
         }
-        links
+        ControlFlow::Continue(links)
     }
 
-    fn store(&mut self) {
+    fn store(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) -> ControlFlow<()> {
         let (mut starts, mut stored) = (vec![0], Vec::new());
         let width = self.graphs[1].points() + 1;
         for i in 0..self.candidates.len() {
             for &j in &self.candidates[i] {
+                watch()?;
                 self.visit(i, j, |a, b, r| stored.push(((a * width + b) as u32, r)));
                 starts.push(stored.len());
             }
         }
         (self.starts, self.stored) = (starts, stored);
+        ControlFlow::Continue(())
     }
 
     /// Calls `take` with each pair `(a, b)` that supports pair `(i, j)`, and its compatibility.
@@ -566,12 +577,17 @@ impl<'a, const D: usize> Links<'a, D> {
     /// `S_ij = Σ_{a∈N(i)} Σ_{b∈N(j)} M_ab r(ia, jb)`.
     ///
     /// A point whose match is settled to rounding keeps the support of that pair alone.
-    fn support(&self, m: &MatchMatrix) -> Vec<f64> {
+    fn support(
+        &self,
+        m: &MatchMatrix,
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> ControlFlow<(), Vec<f64>> {
         let mut support = vec![0.0; m.rows * m.columns];
         let mut pair = 0;
         for (i, candidates) in self.candidates.iter().enumerate() {
             let settled = settled_on(m.row(i));
             for &j in candidates {
+                watch()?;
                 let sum = &mut support[i * m.columns + j];
                 let links = self.starts.get(pair..pair + 2);
                 pair += 1;
@@ -587,7 +603,7 @@ impl<'a, const D: usize> Links<'a, D> {
                 }
             }
         }
-        support
+        ControlFlow::Continue(support)
     }
 }
 

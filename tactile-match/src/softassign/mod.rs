@@ -241,11 +241,10 @@ impl AnnealedSoftassign {
         &self,
         model: &[Point<f64, D>],
         target: &[Point<f64, D>],
+        watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Matching<D>, MatchError> {
         let mut workspace = SoftassignWorkspace::default();
-        let found = self.match_points_with(&mut workspace, model, target, |_, _| {
-            ControlFlow::Continue(())
-        })?;
+        let found = self.match_points_with(&mut workspace, model, target, |_, _| watch())?;
         Ok(found.to_matching(model))
     }
 

@@ -33,6 +33,7 @@ from ._native import (
     SimulatedPress,
     Strain,
     StrainBetween,
+    StrainGrid,
     Surface,
     TactileError,
     ThinPlateSpline,
@@ -48,6 +49,7 @@ from ._native import (
     reconstruct,
     simulate,
     strain_between,
+    strain_series,
 )
 from ._simulated import pipeline_of, press_of
 
@@ -74,6 +76,7 @@ __all__ = [
     "SimulatedPress",
     "Strain",
     "StrainBetween",
+    "StrainGrid",
     "Surface",
     "TactileError",
     "ThinPlateSpline",
@@ -91,4 +94,5 @@ __all__ = [
     "reconstruct",
     "simulate",
     "strain_between",
+    "strain_series",
 ]

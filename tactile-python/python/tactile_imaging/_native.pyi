@@ -6,6 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
+from ._values import PressFrame
+
 __version__: str
 __all__ = [
     "CheckPress",
@@ -30,6 +32,7 @@ __all__ = [
     "SimulatedPress",
     "Strain",
     "StrainBetween",
+    "StrainGrid",
     "Surface",
     "TactileError",
     "ThinPlateSpline",
@@ -46,6 +49,7 @@ __all__ = [
     "run_program",
     "simulate",
     "strain_between",
+    "strain_series",
 ]
 
 _Floats = NDArray[np.float64]
@@ -258,6 +262,11 @@ class Surface(_Result):
     def pixel_size(self) -> tuple[float, float]: ...
     @property
     def origin(self) -> tuple[float, float]: ...
+    @property
+    def x(self) -> NDArray[np.float64]: ...
+    @property
+    def y(self) -> NDArray[np.float64]: ...
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]: ...
 
 @final
 class Strain(_Result):
@@ -285,6 +294,8 @@ class StrainBetween(_Result):
     @property
     def pairs(self) -> NDArray[np.int64]: ...
     @property
+    def points(self) -> NDArray[np.float64]: ...
+    @property
     def displacements(self) -> NDArray[np.float64]: ...
     @property
     def strains(self) -> NDArray[np.float64]: ...
@@ -310,6 +321,23 @@ class StrainBetween(_Result):
     def sigma(self) -> float: ...
     @property
     def flags(self) -> list[str]: ...
+    @property
+    def grid(self) -> StrainGrid | None: ...
+    def to_vtk(self, path: str | PathLike[str]) -> None: ...
+    def plot(self, row: int = 0, column: int = 0) -> Figure: ...
+
+@final
+class StrainGrid(_Result):
+    @property
+    def points(self) -> NDArray[np.float64]: ...
+    @property
+    def counts(self) -> list[int]: ...
+    @property
+    def displacements(self) -> NDArray[np.float64]: ...
+    @property
+    def strains(self) -> NDArray[np.float64]: ...
+    @property
+    def standard_errors(self) -> NDArray[np.float64]: ...
 
 @final
 class Markers(_Result):
@@ -359,6 +387,7 @@ class Match(_Result):
     @property
     def target(self) -> NDArray[np.float64]: ...
     def transform(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def plot(self) -> Figure: ...
 
 @final
 class Lump(_Result):
@@ -535,6 +564,7 @@ class Press:
         time: float | None = None,
     ) -> int: ...
     def __len__(self) -> int: ...
+    def __getitem__(self, frame: int, /) -> PressFrame: ...
     def image(self, frame: int) -> NDArray[np.uint8]: ...
     def contact(self, frame: int) -> Contact | None: ...
     def guide_depression(
@@ -654,5 +684,14 @@ def strain_between(
     measure: str | _StrainMeasure | None = None,
     paired: bool = False,
     with_doubtful_pairs: bool = False,
+    grid: ArrayLike | None = None,
     **options: Any,
 ) -> StrainBetween: ...
+def strain_series(
+    frames: Sequence[ArrayLike],
+    matcher: str | _Matcher | None = None,
+    *,
+    measure: str | _StrainMeasure | None = None,
+    with_doubtful_pairs: bool = False,
+    **options: Any,
+) -> list[StrainBetween | None]: ...

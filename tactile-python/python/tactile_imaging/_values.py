@@ -6,6 +6,24 @@ from typing import Any
 import numpy as np
 
 
+class PressFrame:
+    """A frame of a press, `press[number]`, whose results are worked out when they are asked for."""
+
+    def __init__(self, press: Any, number: int) -> None:
+        self.press, self.number = press, number
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in self.__dir__():
+            raise AttributeError(f"a frame of a press has no {name}")
+        return getattr(self.press, name)(self.number)
+
+    def __dir__(self) -> Any:
+        return ["image", "contact", "surface", "control_points", "matching", "strain", "plot"]
+
+    def __repr__(self) -> str:
+        return f"{self.press!r}[{self.number}]"
+
+
 def _fields(result: Any, names: Any = None) -> Any:
     return {name: getattr(result, name) for name in names or result._fields}
 
@@ -29,6 +47,7 @@ def _entry(value: Any, plain: Any) -> Any:
 
 
 def to_dict(result: Any, plain: Any, names: Any = None) -> Any:
+    names = names or [*result._fields, *result._computed]
     return {name: _entry(value, plain) for name, value in _fields(result, names).items()}
 
 
@@ -44,12 +63,14 @@ def restored(cls: Any, text: Any, fields: Any) -> Any:
 
 
 # Fields that are lists or tuples in a result. Other lists are arrays.
-_LISTS = {"flags", "identified", "rotation", "rotation_error", "translation", "translation_error"}
+_LISTS = {"flags", "identified", "rotation", "rotation_error", "translation", "translation_error", "counts"}
 _TUPLES = {"interval_95", "pixel_size", "origin"}
 
 
 def _from_entry(name: Any, value: Any) -> Any:
     """A field of a result from what `to_dict` made of it."""
+    if name == "grid" and isinstance(value, dict):
+        return from_dict(importlib.import_module("tactile_imaging").StrainGrid, value)
     if isinstance(value, dict) and set(value) == {"value", "standard_error", "interval_95"}:
         return from_dict(importlib.import_module("tactile_imaging").Estimate, value)
     if name in _TUPLES and isinstance(value, (list, tuple)):
@@ -99,7 +120,8 @@ def formatted(result: Any, spec: Any) -> Any:
 def to_dataframe(result: Any) -> Any:
     pd: Any = importlib.import_module("pandas")
 
-    arrays = {name: value for name, value in _fields(result).items() if isinstance(value, np.ndarray) and value.shape != (3, 3)}
+    names = [*result._fields, *result._computed]
+    arrays = {name: value for name, value in _fields(result, names).items() if isinstance(value, np.ndarray) and value.shape != (3, 3)}
     rows = max((len(value) for value in arrays.values()), default=0)
     columns = {}
     for name, value in arrays.items():
@@ -108,3 +130,28 @@ def to_dataframe(result: Any) -> Any:
                 columns["_".join([name, *map(str, place)])] = value[(slice(None), *place)]
     plain = _entry(result, True)
     return pd.DataFrame(columns) if columns else pd.json_normalize(plain)
+
+
+def to_vtk(result: Any, path: Any) -> None:
+    """See `StrainBetween.to_vtk`."""
+    places = result if result.grid is None else result.grid
+    count, axes = places.points.shape
+    counts = list(getattr(places, "counts", []))
+
+    def rows(array: Any) -> str:
+        full = np.zeros((len(array), 3, *array.shape[2:]))
+        full[:, : array.shape[1]] = array
+        return "\n".join(" ".join(f"{x:.17g}" for x in row) for row in full.reshape(-1, 3))
+
+    if counts:
+        steps = [np.unique(places.points[:, k])[:2] for k in range(axes)]
+        spacing = next((float(step[1] - step[0]) for step in steps if len(step) == 2), 1.0)
+        shape, origin = counts + [1] * (3 - axes), rows(places.points[:1])
+        head = f"DATASET STRUCTURED_POINTS\nDIMENSIONS {' '.join(map(str, shape))}\nORIGIN {origin}\nSPACING{f' {spacing:.17g}' * 3}"
+    else:
+        head = f"DATASET POLYDATA\nPOINTS {count} double\n{rows(places.points)}"
+    parts = ["# vtk DataFile Version 3.0\ndisplacement and strain\nASCII", head, f"POINT_DATA {count}"]
+    fields = [("VECTORS displacement", places.displacements), ("TENSORS strain", places.strains), ("TENSORS standard_error", places.standard_errors)]
+    parts += [f"{name} double\n{rows(array)}" for name, array in fields]
+    with open(path, "w", encoding="ascii") as file:
+        file.write("\n".join(parts) + "\n")
