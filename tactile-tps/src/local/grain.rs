@@ -14,8 +14,13 @@ pub(super) fn of_pairs<const D: usize>(
     sources: &[Point<f64, D>],
     targets: &[Point<f64, D>],
 ) -> f64 {
+    let largest = largest_of(sources, targets);
     let multiple = |x: f64, grain: f64| {
         let steps = x / grain;
+        // Any number is nearly no step of a grain that is far larger.
+        if steps.round() == 0.0 && x.abs() > f64::EPSILON * largest {
+            return false;
+        }
         // Tolerance for decimals rounded to binary.
         (steps - steps.round()).abs() <= 1e-15 * steps.abs() + 1e-9 && steps.abs() < 1e14
     };
@@ -37,12 +42,13 @@ pub(super) fn least_noise<const D: usize>(
     targets: &[Point<f64, D>],
     grain: f64,
 ) -> f64 {
-    let largest = sources
-        .iter()
-        .chain(targets)
-        .map(|p| p.coords.amax())
-        .fold(0.0, f64::max);
     (OF_ROUNDING * grain)
-        .max(f64::EPSILON * largest)
+        .max(f64::EPSILON * largest_of(sources, targets))
         .max(f64::MIN_POSITIVE.sqrt())
+}
+
+/// The largest coordinate.
+fn largest_of<const D: usize>(sources: &[Point<f64, D>], targets: &[Point<f64, D>]) -> f64 {
+    let all = sources.iter().chain(targets).map(|p| p.coords.amax());
+    all.fold(0.0, f64::max)
 }
