@@ -636,9 +636,15 @@ impl<const D: usize> Registration<D> {
     }
 
     fn matching(&self, model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Matching<D> {
-        let posterior = self.posterior();
         let m_len = model.len();
-        let assignment = pairs(&posterior, m_len, target.len());
+        // The posterior takes as long as an iteration, and its pairs longer: none if it was stopped.
+        let (posterior, assignment) = if self.stop == StopReason::Cancelled {
+            (vec![0.0; m_len * target.len()], vec![None; m_len])
+        } else {
+            let posterior = self.posterior();
+            let assignment = pairs(&posterior, m_len, target.len());
+            (posterior, assignment)
+        };
         let scale = self.frames[1].scale;
         let moved = |m: usize| SVector::<f64, D>::from_fn(|d, _| self.moved.0[d][m]);
         let warped = (0..m_len).map(|m| self.frames[1].leave(moved(m))).collect();

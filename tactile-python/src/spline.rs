@@ -5,6 +5,7 @@ use nalgebra::{Point, SMatrix};
 use ndarray::{Array2, Array3, ArrayView2, Axis};
 use numpy::{PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use tactile_imaging::tps::{FitOptions, Kernel, NegR, Progress, R2LogR, R3, Smoothing, Spline};
 
 /// A spline of any kernel in the plane or in space, of which the caller's outputs are the first and
@@ -88,6 +89,9 @@ pub(crate) struct ThinPlateSpline {
     complex: bool,
     /// Number of sources.
     points: usize,
+    /// What it was made of.
+    arguments: [Py<PyAny>; 2],
+    keywords: Py<PyDict>,
 }
 
 #[pymethods]
@@ -105,6 +109,12 @@ impl ThinPlateSpline {
         let view = sources.as_array();
         let numpy = py.import("numpy")?;
         let mut values = arrays::asarray("targets", targets)?;
+        let copies = [sources.as_any(), &values].map(|array| array.call_method0("copy"));
+        let [of_sources, of_targets] = copies;
+        let copies = [of_sources?.unbind(), of_targets?.unbind()];
+        let keywords = PyDict::new(py);
+        keywords.set_item("smoothing", smoothing)?;
+        keywords.set_item("kernel", kernel)?;
         let mut shape: Vec<usize> = values.getattr("shape")?.extract()?;
         if shape.is_empty() {
             return Err(invalid(
@@ -171,6 +181,8 @@ impl ThinPlateSpline {
             shape,
             complex,
             points: view.nrows(),
+            arguments: copies,
+            keywords: keywords.unbind(),
         })
     }
 
@@ -246,6 +258,20 @@ impl ThinPlateSpline {
         );
         let sentence = || format!("the sources span {spanned} of {axes} directions");
         (spanned < axes).then(sentence).into_iter().collect()
+    }
+
+    /// It is fitted anew from what it was made of.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (py, made) = (slf.py(), slf.get());
+        let anew = py.import("copyreg")?.getattr("__newobj_ex__")?;
+        let [sources, targets] = made.arguments.each_ref().map(|array| array.bind(py));
+        let given = ((sources, targets), &made.keywords);
+        Ok((
+            anew,
+            (slf.get_type(), given.0, given.1)
+                .into_pyobject(py)?
+                .into_any(),
+        ))
     }
 
     fn __repr__(&self) -> String {

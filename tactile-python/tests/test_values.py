@@ -12,7 +12,7 @@ import weakref
 import numpy as np
 import pytest
 import tactile_imaging as ti
-from conftest import points
+from conftest import lattice, points
 from scipy.interpolate import RBFInterpolator
 
 

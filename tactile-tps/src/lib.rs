@@ -9,7 +9,7 @@
 //! | choose kernel, smoothing, weights | [`FitOptions`], [`Smoothing`], [`Kernel`] |
 //! | see condition, residual and iterations | [`FitReport`] |
 //! | displacement and gradient with errors, from pairs some of which are wrong | [`LocalField`] |
-//! | accept any warp | the object-safe trait [`Warp`]: splines, [`Affine`] |
+//! | accept any warp | the object-safe trait [`Warp`]: splines, [`LocalField`], [`Affine`] |
 //! | fit any kind of warp | the trait [`WarpModel`]: [`FitOptions`], [`AffineModel`] |
 //!
 //! Jacobian: $\nabla f = A + \sum_i w_i U^{\prime}(r_i) (x - x_i)^T/r_i$. Costs for n points:
