@@ -1,37 +1,10 @@
 //! Headings of columns: their names, their units, and the names that programs give to coordinates.
 
 /// Names of x, y and z, the usual one first: DICe, TrackMate, ParaView, scikit-image.
-pub(super) const AXES: [&[&str]; 3] = [
-    &[
-        "x",
-        "coordinate_x",
-        "position_x",
-        "points:0",
-        "centroid-1",
-        "cx",
-        "xc",
-        "col",
-        "column",
-    ],
-    &[
-        "y",
-        "coordinate_y",
-        "position_y",
-        "points:1",
-        "centroid-0",
-        "cy",
-        "yc",
-        "row",
-    ],
-    &[
-        "z",
-        "coordinate_z",
-        "position_z",
-        "points:2",
-        "centroid-2",
-        "cz",
-        "zc",
-    ],
+pub(super) const AXES: [&str; 3] = [
+    "x coordinate_x position_x points:0 centroid-1 cx xc col column",
+    "y coordinate_y position_y points:1 centroid-0 cy yc row",
+    "z coordinate_z position_z points:2 centroid-2 cz zc",
 ];
 
 /// Names of displacements along x, y and z (OpenPIV, finite elements, DICe).
@@ -45,24 +18,8 @@ pub(super) const DISPLACEMENTS: [&[&str]; 3] = [
 pub(super) const FRAME: &[&str] = &["frame", "t"];
 
 /// Other names by which a comment is known as a heading.
-const USUAL: [&str; 16] = [
-    "u",
-    "v",
-    "w",
-    "depth",
-    "force",
-    "load",
-    "darkness",
-    "indentation",
-    "position",
-    "displacement",
-    "time",
-    "pressure",
-    "id",
-    "label",
-    "pixel_value",
-    "integrated_pixel_value",
-];
+const USUAL: &str = "u v w depth force load darkness indentation position displacement time pressure \
+                     id label pixel_value integrated_pixel_value frame t";
 
 /// A heading cut into its name, in lower case, and its unit.
 pub(super) struct Heading {
@@ -95,8 +52,11 @@ impl Heading {
 
     /// Whether it is a usual name of a column, or has a known unit.
     pub(super) fn is_known(&self) -> bool {
-        let mut names = AXES.iter().chain([&FRAME]).copied().flatten().chain(&USUAL);
-        names.any(|name| *name == self.name)
+        let mut names = AXES
+            .into_iter()
+            .chain([USUAL])
+            .flat_map(str::split_whitespace);
+        names.any(|name| name == self.name)
             || self
                 .unit
                 .as_deref()
@@ -136,9 +96,9 @@ pub(super) fn in_si(unit: &str) -> Option<(&'static str, f64)> {
 /// The headings of x and y, and of z if it is there: by their usual names, or else the only ones that
 /// differ in the letter of their axis alone (`x coordinate`, `Pos. X`, `weighted_centroid_x`).
 pub(super) fn axes(headings: &[Heading]) -> Vec<&Heading> {
-    let usual = |names: &&[&str]| {
-        let mut names = names.iter();
-        names.find_map(|name| headings.iter().find(|heading| heading.name == *name))
+    let usual = |names: &&str| {
+        let mut names = names.split_whitespace();
+        names.find_map(|name| headings.iter().find(|heading| heading.name == name))
     };
     let found: Vec<&Heading> = AXES.iter().map_while(usual).collect();
     if found.len() > 1 {

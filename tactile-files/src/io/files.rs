@@ -51,7 +51,9 @@ pub(super) fn open_file(path: &Path) -> std::io::Result<fs::File> {
     let metadata = fs::metadata(path)?;
     // Opening a pipe without a writer would wait for ever, and a device may never end.
     if metadata.is_dir() {
-        return Err(Error::other("it is a folder, not a file"));
+        return Err(Error::other(
+            "it is a folder, not a file: name the files in it",
+        ));
     }
     if !metadata.is_file() {
         return Err(Error::other("it is a pipe or a device, not a file"));

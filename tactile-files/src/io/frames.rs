@@ -22,7 +22,7 @@ use tactile_imaging::pipeline::FrameSource;
 /// video, and a line without an end would fill the memory.
 pub(super) const LONGEST_HEADER: u64 = 4096;
 
-pub(crate) use self::npy::{header_fields, members};
+pub(crate) use self::npy::{Member, header_fields};
 
 /// First bytes of an array of NumPy, and of an archive of them.
 pub(super) const ARRAY_STARTS: [&[u8]; 2] = npy::START;
@@ -297,12 +297,11 @@ impl FrameReader {
         let colours = |found: &str| Broken::new("a frame in red, green and blue", found);
         let convert = |encoded: Encoded, name: &Path| {
             let image = match encoded {
-                Encoded::Luma { .. } | Encoded::DeepLuma(_) => {
+                Encoded::Luma { .. } => {
                     return Err(colours(
                         "luma and chroma: ffmpeg writes colours by -c:v ppm",
                     ));
                 }
-                Encoded::Page(bytes) => decode(&bytes, name)?,
                 Encoded::File(bytes) => decode(&bytes, name)?,
                 Encoded::Decoded(image) => image,
             };
@@ -385,18 +384,14 @@ impl FrameReader {
 
 /// A frame as its stream stores it.
 enum Encoded {
-    /// An image with its header.
-    File(Vec<u8>),
     /// A file whose first image is the frame.
-    Page(Arc<Vec<u8>>),
+    File(Arc<Vec<u8>>),
     Decoded(DynamicImage),
     /// Grey levels of so many rows and columns.
     Luma {
         size: (usize, usize),
         samples: Vec<u8>,
     },
-    /// Luma of more than eight bits, as a PGM.
-    DeepLuma(Vec<u8>),
 }
 
 impl FrameSource for FrameReader {
@@ -412,10 +407,7 @@ impl FrameSource for FrameReader {
         let (grey, bits) = (self.grey, self.bits);
         let convert = |encoded: Encoded, name: &Path| {
             Ok(match encoded {
-                Encoded::Page(bytes) => {
-                    eight_bit_levels(decode(&bytes, name)?, &bytes, name, grey, bits)?
-                }
-                Encoded::File(bytes) | Encoded::DeepLuma(bytes) => {
+                Encoded::File(bytes) => {
                     eight_bit_levels(decode(&bytes, name)?, &bytes, name, grey, bits)?
                 }
                 Encoded::Decoded(image) => eight_bit_levels(image, &[], name, grey, bits)?,
@@ -434,7 +426,7 @@ impl FrameSource for FrameReader {
 }
 
 /// Why a stream does not go on.
-enum Broken {
+pub(crate) enum Broken {
     Read(Error),
     Content {
         expected: String,

@@ -291,7 +291,7 @@ pub(super) fn largest_image() -> (u32, u64) {
 pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileError> {
     if !::image::guess_format(bytes).is_ok_and(|format| format.reading_enabled()) {
         let text = if bytes.is_empty() { "empty" } else { "a text" };
-        let kind = kind_of(bytes).unwrap_or(text);
+        let kind = kind_of(bytes).unwrap_or(text.into());
         return Err(refused(path, format!("it is {kind}: an image is wanted")));
     }
     if is_cut_jpeg(bytes) {

@@ -2,61 +2,51 @@
 
 pub(super) const UTF_16: &str = "UTF-16 text";
 
-/// First bytes (where they stand, and what they are) and what such a file is, with the remedy.
-const KINDS: [(usize, &[u8], &str); 25] = [
-    (
-        8,
-        b"WEBP",
-        "a WebP image, which is not read: save it as PNG",
-    ),
-    (0, b"\xff\xfe", UTF_16),
-    (0, b"\xfe\xff", UTF_16),
-    (0, b"\x89PNG", "a PNG image"),
-    (0, b"\xff\xd8\xff", "a JPEG image"),
-    (0, b"II*\0", "a TIFF image"),
-    (0, b"MM\0*", "a TIFF image"),
-    (
-        0,
-        b"II+\0",
-        "a BigTIFF, which is not read: save it as TIFF (tifffile: bigtiff=False)",
-    ),
-    (
-        0,
-        b"MM\0+",
-        "a BigTIFF, which is not read: save it as TIFF (tifffile: bigtiff=False)",
-    ),
-    (0, b"BM", "a BMP image, which is not read: save it as PNG"),
+/// First bytes (where they stand, and what they are), what such a file is, and the remedy.
+const KINDS: [(usize, &[u8], &str, &str); 25] = [
+    (8, b"WEBP", "a WebP image", AS_PNG),
+    (0, b"\xff\xfe", UTF_16, ""),
+    (0, b"\xfe\xff", UTF_16, ""),
+    (0, b"\x89PNG", "a PNG image", ""),
+    (0, b"\xff\xd8\xff", "a JPEG image", ""),
+    (0, b"II*\0", "a TIFF image", ""),
+    (0, b"MM\0*", "a TIFF image", ""),
+    (0, b"II+\0", "a BigTIFF", AS_TIFF),
+    (0, b"MM\0+", "a BigTIFF", AS_TIFF),
+    (0, b"BM", "a BMP image", AS_PNG),
     (
         0,
         b"GIF8",
-        "a GIF, which is not read: save its frames as PNG",
+        "a GIF",
+        ", which is not read: save its frames as PNG",
     ),
-    (0, b"P5\n", "a PGM image"),
-    (0, b"P6\n", "a PPM image"),
-    (0, b"YUV4MPEG2", "a YUV4MPEG2 video"),
-    (0, b"RIFF", "an AVI video"),
-    (4, b"ftyp", MPEG),
-    (0, b"\x1a\x45\xdf\xa3", MPEG),
-    (0, b"OggS", MPEG),
-    (0, b"\x00\x00\x01", MPEG),
-    (0, b"\x93NUMPY", "an array of NumPy"),
+    (0, b"P5\n", "a PGM image", ""),
+    (0, b"P6\n", "a PPM image", ""),
+    (0, b"YUV4MPEG2", "a YUV4MPEG2 video", ""),
+    (0, b"RIFF", "an AVI video", ""),
+    (4, b"ftyp", "a compressed video", PIPED),
+    (0, b"\x1a\x45\xdf\xa3", "a compressed video", PIPED),
+    (0, b"OggS", "a compressed video", PIPED),
+    (0, b"\x00\x00\x01", "a compressed video", PIPED),
+    (0, b"\x93NUMPY", "an array of NumPy", ""),
+    (0, b"PK\x03\x04", "a ZIP archive", AS_CSV_OR_NPZ),
+    (0, b"\x89HDF", "an HDF5 file", AS_CSV_OR_MAT),
     (
         0,
-        b"PK\x03\x04",
-        "a ZIP archive: a spreadsheet is saved as CSV, arrays by numpy.savez",
+        b"MATLAB 5.0",
+        "a .mat file",
+        ": numpy.save writes frames",
     ),
-    (
-        0,
-        b"\x89HDF",
-        "an HDF5 file: export CSV, or save .mat by `save -v7`",
-    ),
-    (0, b"MATLAB 5.0", "a .mat file: numpy.save writes frames"),
-    (0, b"%PDF", "a PDF"),
-    (0, b"\x1f\x8b", "a file packed by gzip: unpack it"),
+    (0, b"%PDF", "a PDF", ""),
+    (0, b"\x1f\x8b", "a file packed by gzip", ": unpack it"),
 ];
 
-const MPEG: &str = "a compressed video, which is not read: pipe it by \
-                    ffmpeg -i VIDEO -f yuv4mpegpipe -pix_fmt gray - | tactile … -";
+const AS_PNG: &str = ", which is not read: save it as PNG";
+const AS_TIFF: &str = ", which is not read: save it as TIFF (tifffile: bigtiff=False)";
+const AS_CSV_OR_NPZ: &str = ": a spreadsheet is saved as CSV, arrays by numpy.savez";
+const AS_CSV_OR_MAT: &str = ": export CSV, or save .mat by `save -v7`";
+const PIPED: &str = ", which is not read: pipe it by \
+                     ffmpeg -i VIDEO -f yuv4mpegpipe -pix_fmt gray - | tactile … -";
 
 /// What begins a text that is no table, and what such a text is, with the remedy.
 const TEXTS: [(&str, &str); 5] = [
@@ -71,7 +61,7 @@ const TEXTS: [(&str, &str); 5] = [
 ];
 
 /// What a text is that is no table. `None` for one that may be.
-pub(super) fn kind_of_text(bytes: &[u8]) -> Option<&'static str> {
+pub(super) fn kind_of_text(bytes: &[u8]) -> Option<String> {
     let text = bytes.trim_ascii_start();
     // A preamble may have names in brackets.
     let list = text.strip_prefix(b"[").map(<[u8]>::trim_ascii_start);
@@ -81,23 +71,23 @@ pub(super) fn kind_of_text(bytes: &[u8]) -> Option<&'static str> {
     let text = if is_json { b"{" } else { text };
     let mut texts = TEXTS.iter();
     let (_, kind) = texts.find(|(start, _)| text.starts_with(start.as_bytes()))?;
-    Some(kind)
+    Some((*kind).into())
 }
 
 /// Bytes of a file that are looked at: text has no control characters among them.
 const LOOKED_AT: usize = 4096;
 
 /// What a file is that is no text. `None` for text.
-pub(super) fn kind_of(bytes: &[u8]) -> Option<&'static str> {
-    let begins = |(at, magic, _): &&(usize, &[u8], &str)| {
+pub(super) fn kind_of(bytes: &[u8]) -> Option<String> {
+    let begins = |(at, magic, ..): &&(usize, &[u8], &str, &str)| {
         let rest = bytes.get(*at..).unwrap_or_default();
         // Two letters may begin a text as well.
         rest.starts_with(magic) && (magic.len() > 2 || !is_text(bytes) || *at > 0)
     };
-    let kind = KINDS.iter().find(begins).map(|(_, _, kind)| *kind);
-    kind.or((!is_text(bytes)).then_some(
-        "a binary file of an unknown kind: export it as CSV, or as PNG if it is an image",
-    ))
+    let unknown = "a binary file of an unknown kind: export it as CSV, or as PNG if it is an image";
+    let kind = KINDS.iter().find(begins);
+    let kind = kind.map(|(_, _, kind, remedy)| format!("{kind}{remedy}"));
+    kind.or((!is_text(bytes)).then(|| unknown.into()))
 }
 
 /// Whether a file is a text, as far as its beginning shows.

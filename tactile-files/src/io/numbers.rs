@@ -4,7 +4,7 @@
 //! beforehand, and no well-kept crate reads `.mat`.
 use super::error::{FileError, FilePlace, quoted};
 use super::files::LARGEST_FILE;
-use super::frames::{ARRAY_STARTS, header_fields, members};
+use super::frames::{ARRAY_STARTS, Member, header_fields};
 use super::text::TextCells;
 use flate2::read::ZlibDecoder;
 use ndarray::{Array3, ArrayD, IxDyn, ShapeBuilder};
@@ -203,21 +203,21 @@ fn arrays(bytes: &[u8]) -> Option<Vec<Array>> {
     if bytes.starts_with(MAT_5) {
         return Some(of_mat(bytes));
     }
-    // A spreadsheet is an archive, too.
-    let files = bytes
-        .starts_with(ARRAY_STARTS[1])
-        .then(|| members(bytes, LARGEST_FILE))?;
-    let files = files.unwrap_or_default();
-    let mut files = files
-        .iter()
-        .filter(|(name, _)| name.ends_with(".npy"))
-        .peekable();
-    files.peek()?;
-    Some(
-        files
-            .filter_map(|(name, bytes)| of_npy(name, bytes))
-            .collect(),
-    )
+    if !bytes.starts_with(ARRAY_STARTS[1]) {
+        return None;
+    }
+    let (mut rest, mut total) = (bytes, 0);
+    let (mut arrays, mut any) = (Vec::new(), false);
+    while let Ok(Some(Member { name, content, .. })) = Member::next(&mut rest) {
+        let bytes = content.get_ref();
+        total += bytes.len() as u64;
+        // A spreadsheet is an archive, too.
+        if name.ends_with(".npy") && total <= LARGEST_FILE {
+            any = true;
+            arrays.extend(of_npy(&name, bytes));
+        }
+    }
+    any.then_some(arrays)
 }
 
 /// The cells of arrays: of one array, or of several columns of one length, each by its name. `None`
@@ -227,9 +227,12 @@ pub(super) fn cells(bytes: &[u8], path: &Path) -> Option<Result<TextCells, FileE
     let refused = |found: String| FileError::content(path, FilePlace::File, expected, found);
     let mut arrays = arrays(bytes)?;
     arrays.retain(|array| array.sides().is_some());
-    // A frame rate or another setting beside a table is no part of it.
-    if arrays.iter().any(|array| array.values.len() > 1) {
-        arrays.retain(|array| array.values.len() > 1);
+    // A frame rate or another setting beside a table is no part of it, even if the table is empty.
+    for is_table in [|length| length > 1, |length| length == 0] {
+        if arrays.iter().any(|array| is_table(array.values.len())) {
+            arrays.retain(|array| is_table(array.values.len()));
+            break;
+        }
     }
     let mut table = TextCells::default();
     match arrays.as_slice() {

@@ -1,5 +1,5 @@
 //! Tables of numbers, as text or arrays: columns by name in SI units, points, grids.
-use super::columns::{AXES, DISPLACEMENTS, FRAME, Heading, axes, in_si};
+use super::columns::{DISPLACEMENTS, FRAME, Heading, axes, in_si};
 use super::error::{FileError, FilePlace, quoted};
 use super::files::read_bytes;
 use super::numbers;
@@ -498,7 +498,7 @@ fn points_of(table: &mut Table, displaced: bool) -> Result<Points, FileError> {
     let unit = if in_pixels { "px" } else { "m" };
     let names = |axis: usize| found.get(axis).map(|heading| heading.name.as_str());
     let names: Vec<Vec<&str>> = (0..axis_count)
-        .map(|axis| vec![names(axis).unwrap_or(AXES[axis][0])])
+        .map(|axis| vec![names(axis).unwrap_or(["x", "y", "z"][axis])])
         .collect();
     let displacements = DISPLACEMENTS
         .iter()

@@ -293,9 +293,9 @@ fn names_columns(text: &str) -> [bool; 2] {
 /// A file as text. What is no UTF-8 is read as Latin-1, whose micro sign stands in many headings.
 fn decoded<'a>(bytes: &'a [u8], path: &Path, skip_lines: usize) -> Result<Cow<'a, str>, FileError> {
     if let Some(kind) = kind_of(bytes).or_else(|| kind_of_text(bytes).filter(|_| skip_lines == 0)) {
-        let expected = match kind {
+        let expected = match kind.as_str() {
             UTF_16 => "UTF-8 text",
-            _ => "a table of numbers",
+            _ => "a table of numbers (text, NPY, NPZ or MAT)",
         };
         return Err(FileError::content(path, FilePlace::File, expected, kind));
     }

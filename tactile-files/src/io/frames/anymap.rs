@@ -26,7 +26,7 @@ impl Decoder for Anymaps {
         if bytes.len() < header + samples {
             return Err(Broken::cut(samples, bytes.len() - header));
         }
-        Ok(Some(Encoded::File(bytes)))
+        Ok(Some(Encoded::File(bytes.into())))
     }
 }
 

@@ -122,7 +122,7 @@ impl Avi {
         // Rows of colours are filled up to a multiple of four bytes.
         let width = (3 * columns).next_multiple_of(4);
         let needed = match self.pixels {
-            Pixels::Jpeg => return Ok(Encoded::File(with_tables(bytes))),
+            Pixels::Jpeg => return Ok(Encoded::File(with_tables(bytes).into())),
             Pixels::Planar => pixels,
             Pixels::Packed(_) => 2 * pixels,
             Pixels::Bgr => width * rows,

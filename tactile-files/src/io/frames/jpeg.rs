@@ -58,10 +58,10 @@ impl Decoder for Images {
         let mut bytes = start.to_vec();
         if start == STARTS[1] {
             png(input, &mut bytes)?;
-            return Ok(Some(Encoded::File(bytes)));
+            return Ok(Some(Encoded::File(bytes.into())));
         }
         self.jpeg(input, &mut bytes)?;
-        Ok(Some(Encoded::File(with_tables(bytes))))
+        Ok(Some(Encoded::File(with_tables(bytes).into())))
     }
 
     fn goes_on(&self) -> bool {

@@ -39,7 +39,7 @@ pub(super) const OTHERS: Format = Format {
             format!("a text that begins with `{}`", quoted(&start, 10))
         };
         let kind = kind_of(&bytes).or_else(|| kind_of_text(&bytes));
-        let found = kind.map_or_else(text, str::to_owned);
+        let found = kind.unwrap_or_else(text);
         Err(Broken::new(
             format!("a video or an image ({})", frame_formats()),
             found,
@@ -59,7 +59,7 @@ struct Single(Vec<u8>);
 impl Decoder for Single {
     fn next(&mut self, _: &mut dyn BufRead, _: Vec<u8>) -> Result<Option<Encoded>, Broken> {
         let bytes = Some(take(&mut self.0)).filter(|bytes| !bytes.is_empty());
-        Ok(bytes.map(Encoded::File))
+        Ok(bytes.map(|bytes| Encoded::File(bytes.into())))
     }
 }
 
@@ -140,7 +140,7 @@ impl Decoder for Pages {
                 format!("{}: {remedy}", self.seen.len()),
             ));
         }
-        Ok(page.map(Encoded::Page))
+        Ok(page.map(Encoded::File))
     }
 
     fn goes_on(&self) -> bool {

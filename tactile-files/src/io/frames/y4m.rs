@@ -122,7 +122,7 @@ impl Decoder for Video {
                 size: (self.rows, self.columns),
                 samples,
             },
-            _ => Encoded::DeepLuma(self.anymap(&samples)),
+            _ => Encoded::File(self.anymap(&samples).into()),
         }))
     }
 
