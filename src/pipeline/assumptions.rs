@@ -74,7 +74,7 @@ impl Assumption {
             key: "poisson_ratio_error",
             default: 0.01,
             unit: "",
-            remedy: "a statement of its error (poisson_ratio_error)",
+            remedy: "its stated error (poisson_ratio_error)",
         },
         Self {
             source: Source::Adhesion,
@@ -82,7 +82,7 @@ impl Assumption {
             // The value for a dusted ball. Clean dry silicone has several tens of mJ/m².
             default: 1e-3,
             unit: "J/m²",
-            remedy: "larger forces, or talc and a statement of adhesion_error_j_per_m2",
+            remedy: "larger forces, or talc and a stated adhesion_error_j_per_m2",
         },
         Self {
             source: Source::Guide,

@@ -48,8 +48,8 @@ fn remedy(source: Source) -> &'static str {
     match (Assumption::of(source), source) {
         (Some(assumption), _) => assumption.remedy,
         (None, Source::Noise) => "more frames of the same loads",
-        (None, Source::Calibration) => "more pairs of the calibration, by a better gauge",
-        (None, Source::Profile) => "a rounder contact, lit evenly",
+        (None, Source::Calibration) => "more calibration pairs, or a better gauge",
+        (None, Source::Profile) => "a rounder contact with even illumination",
         (None, Source::Law) => "a contact table by finite elements",
         _ => "what the estimator's author states",
     }

@@ -190,7 +190,7 @@ impl<P: Deref<Target: ContactStage> + Send + Sync> ContactStage for P {
 /// assert!((contact.contact_radius_m.value / 1e-3 - 1.0).abs() < 0.01);
 /// let force = contact.force_n.expect("a calibrated sensor");
 /// assert!((force.value / 1.005 - 1.0).abs() < 0.01);
-/// assert_eq!(contact.flags(0).count(), 0, "nothing to caution of");
+/// assert_eq!(contact.flags(0).count(), 0, "no caution");
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]

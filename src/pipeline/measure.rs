@@ -51,7 +51,7 @@ impl Press<'_> {
     ///     measurement
     ///         .flags
     ///         .iter()
-    ///         .any(|flag| flag.to_string().contains("small-contact theory does not hold"))
+    ///         .any(|flag| flag.to_string().contains("small-contact theory is not valid"))
     /// );
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```

@@ -243,7 +243,7 @@ impl Pipeline {
     /// let mut press = dark.press(reference.view())?;
     /// press.add_frame(darker.view());
     /// let depth = press.contact(0)?.and_then(|contact| contact.indentation_m).expect("a depth");
-    /// assert!((depth.value - 0.25e-3).abs() < 1e-9, "half of the darkness that is 0.5 mm deep");
+    /// assert!((depth.value - 0.25e-3).abs() < 1e-9, "half of the darkening for 0.5 mm");
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
     #[must_use]

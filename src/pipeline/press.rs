@@ -98,7 +98,7 @@ struct KnownContact {
 /// assert_eq!(
 ///     (press.frames(), press.report().work(Stage::Contact).runs),
 ///     (2, 0),
-///     "nothing is asked for yet"
+///     "nothing is requested yet"
 /// );
 /// let force = press.contact(0)?.and_then(|c| c.force_n).expect("a force");
 /// assert!((force.value / 0.7 - 1.0).abs() < 0.02);
@@ -106,7 +106,7 @@ struct KnownContact {
 ///     (press.modulus()?.youngs_modulus_pa / 103e3 - 1.0).abs() < 0.0538,
 ///     "Hertz, from both contacts"
 /// );
-/// assert_eq!(press.report().work(Stage::Surface).runs, 0, "no surface so far");
+/// assert_eq!(press.report().work(Stage::Surface).runs, 0, "no surface yet");
 /// press.strain(1)?;
 /// assert_eq!(press.report().work(Stage::Surface).runs, 2);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -477,7 +477,7 @@ impl<'a> Press<'a> {
     /// let matching = press.matching(1)?;
     /// let partners: Vec<_> = matching.assignment.iter().flatten().copied().collect();
     /// assert!(partners.len() > 50);
-    /// assert_eq!(matching.warped.len(), 60, "where the first frame's points have gone");
+    /// assert_eq!(matching.warped.len(), 60, "new positions of the first frame's points");
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///

@@ -26,7 +26,7 @@ const BLOCKS: usize = 8;
 /// let mut press = pipeline.press(hertz(0.9, 0.0).view())?;
 /// press.add_frame(hertz(0.9, 120.0));
 /// let force = press.contact(0)?.and_then(|c| c.force_n).expect("a force");
-/// assert!((force.value / 1.005 - 1.0).abs() < 0.01, "a tenth less light is no tenth less force");
+/// assert!((force.value / 1.005 - 1.0).abs() < 0.01, "a tenth less light does not change the force");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]

@@ -90,7 +90,7 @@ impl fmt::Display for SkipReason {
             Self::NotAsked => "not asked for",
             Self::NoContact => "no contact",
             Self::KeptFromBefore => "kept from an earlier load",
-            Self::NearLastAnswer => "begun from the last answer",
+            Self::NearLastAnswer => "started from the last result",
         })
     }
 }

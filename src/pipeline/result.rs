@@ -122,7 +122,7 @@ pub struct FrameResult {
 /// assert!(matching.matched > 50 && matching.mean_confidence > 0.5);
 /// assert!(
 ///     matching.residual_m < matching.mean_displacement_m,
-///     "the warp takes points to their partners"
+///     "the warp maps points to their partners"
 /// );
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -190,7 +190,7 @@ pub struct StrainResult {
 /// let modulus = measurement.youngs_modulus_pa.as_ref().expect("two loads");
 /// assert!((modulus.value / 103e3 - 1.0).abs() < 0.0538, "the ball's 103 kPa");
 /// assert_eq!(measurement.frames.len(), 2);
-/// assert!(measurement.estimators.contains(modulus), "beside the paper's ratio");
+/// assert!(measurement.estimators.contains(modulus), "in addition to the paper's ratio");
 /// assert!(measurement.to_string().starts_with(&format!("Young's modulus  {modulus}")));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

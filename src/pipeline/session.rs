@@ -338,7 +338,7 @@ impl Session {
     /// assert_eq!(
     ///     (session.frames(), session.loads()),
     ///     (6, 2),
-    ///     "neither frames without contact nor an image that came before are a load"
+    ///     "frames without contact and repeated images are not loads"
     /// );
     /// for k in 0..40 {
     ///     session.push(hertz(100.0 + f64::from(k)).view())?;
@@ -366,10 +366,10 @@ impl Session {
     /// session.push(hertz(0.0).mapv(|v| v - 2).view())?;
     /// session.push(hertz(120.0).view())?;
     /// let drift = session.drift();
-    /// assert_eq!((drift.frames, drift.last_grey), (1, -2.0), "contacts say nothing of the light");
+    /// assert_eq!((drift.frames, drift.last_grey), (1, -2.0), "contacts give no light level");
     /// assert_eq!(drift.caution, Some(Flag::LightDrifted { grey: -2.0 }));
     /// session.push(hertz(0.0).view())?;
-    /// assert_eq!(session.drift().caution, None, "the light is back");
+    /// assert_eq!(session.drift().caution, None, "the light is as before");
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
     pub fn drift(&self) -> &DriftWatch {
@@ -544,7 +544,7 @@ impl Session {
 ///     session.push(frame.view())?;
 ///     if let Some(found) = session.strain()? {
 ///         assert_eq!((found.from, found.to), (0, 1));
-///         assert!(found.strain.summary.mean[(0, 0)] > 0.0, "the load rose: the surface grew");
+///         assert!(found.strain.summary.mean[(0, 0)] > 0.0, "the load increased: the surface grew");
 ///     }
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -28,7 +28,7 @@ const THREE_PER_LAYER: &str = "three rows and columns per layer (ln E, ln h, ν)
 /// assert_eq!(shading.settings().surface_input, SurfaceInput::Shading);
 /// let table = DarkContact::depth_table(&[(0.0, 0.0), (100.0, 0.5e-3)])?;
 /// let depth = shading.with_surface(table, SurfaceInput::Signal);
-/// assert_eq!(depth.settings().smoothing_px, 1, "heights as they are measured");
+/// assert_eq!(depth.settings().smoothing_px, 1, "measured heights");
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -57,7 +57,7 @@ pub enum SurfaceInput {
 /// let settings: &Settings = pipeline.settings();
 /// assert_eq!((settings.control_points, settings.smoothing_px), (80, 3));
 /// assert_eq!(settings.binning, Binning::Auto);
-/// assert!(settings.waveguide.is_none(), "rigid beside the ball");
+/// assert!(settings.waveguide.is_none(), "rigid compared with the ball");
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
 #[derive(Clone, Debug)]

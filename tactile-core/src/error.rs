@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// assert_eq!(failure.to_string(), "the network has no weights");
 /// let failure = CustomError::new("seven".parse::<u8>().unwrap_err());
 /// assert!(failure.get_ref().is::<std::num::ParseIntError>());
-/// assert!(failure.source().is_none(), "nothing stands behind it");
+/// assert!(failure.source().is_none(), "it has no source");
 /// ```
 #[derive(Clone, Debug)]
 pub struct CustomError(Arc<dyn Error + Send + Sync>);

@@ -97,7 +97,7 @@ impl Display for Source {
         f.write_str(match self {
             Self::Noise => "noise of the frames",
             Self::Calibration => "the calibration of the force",
-            Self::Coupling => "the light that the object couples",
+            Self::Coupling => "the optical coupling of the object",
             Self::Gain => "the scale of the force",
             Self::PixelSize => "the size of a pixel",
             Self::Profile => "the profile of the contact",

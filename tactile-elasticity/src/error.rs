@@ -37,7 +37,7 @@ pub enum ElasticityError {
         found: f64,
     },
     /// A Poisson ratio is outside (−1, ½], the stable range of an isotropic solid.
-    #[error("Poisson ratio must lie in (-1, 1/2], found {}", Readable(*found))]
+    #[error("Poisson's ratio must lie in (-1, 1/2], found {}", Readable(*found))]
     PoissonRatio {
         /// The value given.
         found: f64,
@@ -63,7 +63,7 @@ pub enum ElasticityError {
         lower_bound_pa: Option<f64>,
     },
     /// The contact of a load is outside the range of the law, and no other load is within it.
-    #[error("load {}: the contact is beyond what the law describes", load + 1)]
+    #[error("load {}: the contact is outside the range of the law", load + 1)]
     BeyondLaw {
         /// Index of the load.
         load: usize,
@@ -133,7 +133,7 @@ pub enum ElasticityError {
     },
     /// A value is outside the range of the law, such as a contact radius larger than the sphere's
     /// radius.
-    #[error("{quantity} = {} is beyond the law's reach ({})", Readable(*found), Readable(*limit))]
+    #[error("{quantity} = {} is beyond the law's range ({})", Readable(*found), Readable(*limit))]
     OutOfRange {
         /// The input.
         quantity: Quantity,
@@ -161,7 +161,7 @@ pub enum ElasticityError {
         found: u32,
     },
     /// The contacts of a table do not give a force that increases with contact radius and modulus.
-    #[error("the table's force does not grow with contact radius and modulus everywhere")]
+    #[error("the force of the table does not always increase with contact radius and modulus")]
     NotMonotone,
     /// The finite elements did not converge at a contact that a table needs.
     #[error(
@@ -371,7 +371,7 @@ impl Quantity {
     /// ```
     /// use tactile_elasticity::Quantity;
     /// let error = Quantity::ContactRadius.beyond(2e-3, 1e-3);
-    /// assert_eq!(error.to_string(), "contact radius = 0.002 is beyond the law's reach (0.001)");
+    /// assert_eq!(error.to_string(), "contact radius = 0.002 is beyond the law's range (0.001)");
     /// ```
     pub fn beyond(self, found: f64, limit: f64) -> ElasticityError {
         ElasticityError::OutOfRange {
@@ -396,7 +396,7 @@ pub(crate) fn poisson(value: f64) -> Result<f64, ElasticityError> {
 fn bounded_below(lower_bound_pa: Option<f64>) -> String {
     match lower_bound_pa {
         Some(bound) => format!(
-            ": it has more than {:.3} kPa with 95 % confidence",
+            ": its modulus is above {:.3} kPa with 95 % confidence",
             bound * 1e-3
         ),
         None => ": the contact is no larger than a rigid one would be; check forces, pixel size, \

@@ -21,7 +21,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum ForceError {
     /// Two corresponding images differ in size.
-    #[error("image of {found:?} (rows, columns) where {expected:?} was expected")]
+    #[error("image of {found:?} (rows, columns), expected {expected:?}")]
     SizeMismatch {
         /// Rows and columns of the first image.
         expected: (usize, usize),
@@ -56,7 +56,7 @@ pub enum ForceError {
         required: f64,
     },
     /// Too much of the contact is saturated for a reliable force.
-    #[error("{share} of the contact is saturated, more than the stated {limit}")]
+    #[error("{share} of the contact is saturated, more than the allowed {limit}")]
     SaturatedContact {
         /// Fraction of the contact's pixels that are saturated.
         share: f64,
@@ -78,7 +78,7 @@ pub enum ForceError {
         index: usize,
     },
     /// All observations have (nearly) the same input, so the slope is undetermined.
-    #[error("the observations span too little ({span}) to determine a slope")]
+    #[error("the range of the observations ({span}) is too small to determine a slope")]
     DegeneratePairs {
         /// Spread of the input.
         span: f64,

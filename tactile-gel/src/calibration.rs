@@ -125,17 +125,17 @@ impl core::fmt::Display for CalibrationDoubt {
         match self {
             Self::FewPresses { used, given } => write!(
                 f,
-                "{used} of {given} presses were used: five to twenty at many places are needed"
+                "{used} of {given} presses were used: five to twenty at different positions are needed"
             ),
             Self::LargeAngle(angle) => write!(
                 f,
-                "normals of presses left out are {angle:.1}° off in the median: look for a lamp that \
-                 changed, a wrong reference or wrong circles"
+                "the normals of left-out presses are wrong by {angle:.1}° in the median: check for a \
+                 changed lamp, a wrong reference or wrong circles"
             ),
             Self::BallSize(factor) => write!(
                 f,
-                "the light fits a ball of {:.2} times the stated radius: is the diameter given for \
-                 the radius, or the pixel's size wrong?",
+                "the light fits a ball of {:.2} times the stated radius: was the diameter given \
+                 instead of the radius, or is the pixel size wrong?",
                 factor.recip()
             ),
             Self::FlatBall(share) => write!(

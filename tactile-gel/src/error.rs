@@ -49,7 +49,7 @@ pub enum GelError {
         available: usize,
     },
     /// Most presses do not come from the sensor of the reference.
-    #[error("{presses} of {given} presses are no frames of the reference's sensor: {doubt}")]
+    #[error("{presses} of {given} presses do not come from the sensor of the reference: {doubt}")]
     OtherFrames {
         /// Number of such presses.
         presses: usize,
@@ -62,7 +62,7 @@ pub enum GelError {
     #[error("the presses do not determine the sensor")]
     NoSolution,
     /// A frame of a known weight shows no contact.
-    #[error("a frame of a known weight shows no contact that carries a force")]
+    #[error("a frame of a known weight shows no contact with a force")]
     NoContact,
     /// A frame under one gauge reading shows several contacts.
     #[error("a frame under one reading of a gauge shows several contacts")]

@@ -105,7 +105,7 @@ impl core::fmt::Display for FrameDoubt {
             Self::White => write!(f, "the frame is white: all of it is saturated"),
             Self::Noise => write!(
                 f,
-                "the frame is noise: neighbouring pixels have nothing in common"
+                "the frame is noise: neighbouring pixels are uncorrelated"
             ),
             Self::Exposure(factor) => write!(
                 f,
@@ -114,33 +114,37 @@ impl core::fmt::Display for FrameDoubt {
             ),
             Self::Balance([r, g, b]) => write!(
                 f,
-                "the white balance is not the reference's: red {r:.2}, green {g:.2} and blue {b:.2} \
-                 times its level"
+                "the white balance differs from that of the reference: red {r:.2}, green {g:.2} and \
+                 blue {b:.2} times its level"
             ),
             Self::ChannelsExchanged([2, 1, 0]) => write!(
                 f,
-                "red and blue look exchanged: OpenCV hands out blue, green, red"
+                "red and blue seem to be exchanged: OpenCV returns blue, green, red"
             ),
             Self::ChannelsExchanged(order) => {
                 write!(
                     f,
-                    "the channels look exchanged: red, green, blue are {order:?}"
+                    "the channels seem to be exchanged: red, green, blue are {order:?}"
                 )
             }
-            Self::Turned(Turn::Half) => write!(f, "the frame looks turned by 180°"),
-            Self::Turned(Turn::LeftRight) => write!(f, "the frame looks mirrored left to right"),
-            Self::Turned(Turn::TopBottom) => write!(f, "the frame looks mirrored top to bottom"),
-            Self::Turned(Turn::Quarter) => write!(f, "the frame looks turned by 90°"),
+            Self::Turned(Turn::Half) => write!(f, "the frame seems to be rotated by 180°"),
+            Self::Turned(Turn::LeftRight) => {
+                write!(f, "the frame seems to be mirrored left to right")
+            }
+            Self::Turned(Turn::TopBottom) => {
+                write!(f, "the frame seems to be mirrored top to bottom")
+            }
+            Self::Turned(Turn::Quarter) => write!(f, "the frame seems to be rotated by 90°"),
             Self::AnotherPattern(share) => write!(
                 f,
-                "the light's pattern differs from the reference's by {:.0} % along the border: taken \
-                 by another unit, or lamps or gel have changed",
+                "the light pattern along the border differs from that of the reference by {:.0} %: \
+                 another unit of the sensor, or changed lamps or gel",
                 100.0 * share
             ),
             Self::NoSurface => write!(
                 f,
-                "the colours belong to no face that is pressed in: exchanged channels, a turned or \
-                 mirrored frame, or other lamps"
+                "the colours do not correspond to an indented surface: exchanged channels, a \
+                 rotated or mirrored frame, or other lamps"
             ),
         }
     }

@@ -44,7 +44,7 @@ pub struct AssumedInclusion {
 /// use tactile_inclusion::ExpectedErrors;
 ///
 /// let errors = ExpectedErrors { diameter: 0.02, depth: 0.04, youngs_modulus: 0.4 };
-/// assert!(errors.youngs_modulus > 0.3, "a modulus that could not be told");
+/// assert!(errors.youngs_modulus > 0.3, "the modulus cannot be determined");
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]

@@ -46,7 +46,7 @@ pub enum MatchError {
     },
     /// Too many points of a large set coincide: each is a candidate for each, so the table of
     /// candidates grows with the square of their number.
-    #[error("{count} points of the {set} lie in one place, at most {limit} can be matched")]
+    #[error("{count} points of the {set} lie at one position, at most {limit} can be matched")]
     Coincident {
         /// Name of the set, "model" or "target".
         set: &'static str,
@@ -74,7 +74,7 @@ pub enum MatchError {
         column: usize,
     },
     /// A pair names a row that does not exist in its set, or a row of an earlier pair.
-    #[error("pair {pair} has row {row} of the {set}, which does not exist or is taken")]
+    #[error("pair {pair} has row {row} of the {set}, which does not exist or is used twice")]
     PairRow {
         /// Index of the pair.
         pair: usize,

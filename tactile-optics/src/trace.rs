@@ -445,7 +445,7 @@ pub fn path<S: TopSurface + ?Sized>(
     angle: f64,
     vertices: &mut [[f64; 3]],
 ) -> Result<usize, OpticsError> {
-    within("share of the slab's depth", depth_share, 0.0, 1.0)?;
+    within("fraction of the slab's depth", depth_share, 0.0, 1.0)?;
     // A ray at a larger angle would start backwards, out of the lit edge.
     let right = FRAC_PI_2;
     within("angle of the ray", angle, -right, right)?;

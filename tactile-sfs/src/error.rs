@@ -95,9 +95,9 @@ pub enum SfsError {
     },
     /// A calibration table does not determine the depth at zero signal.
     #[error(
-        "the table does not tell its depth at zero signal: it has {entries} entries above the \
-         threshold of contact (4 are needed), which a parabola misses by {misfit:.3} of their \
-         range (0.010 is allowed)"
+        "the table does not determine its depth at zero signal: it has {entries} entries above the \
+         threshold of contact (4 are needed), and a parabola deviates from them by {misfit:.3} of \
+         their range (0.010 is allowed)"
     )]
     TableZero {
         /// Number of entries above the threshold of contact.
@@ -107,7 +107,7 @@ pub enum SfsError {
     },
     /// More control points were requested than the surface has pixels.
     #[error(
-        "{requested} control points asked for, but the surface has only {available} usable pixels"
+        "{requested} control points requested, but the surface has only {available} usable pixels"
     )]
     TooManyPoints {
         /// Requested points.

@@ -53,7 +53,7 @@ pub enum SimulateError {
     },
     /// There are no finite-element contacts for this ball or waveguide.
     #[error(
-        "finite-element contacts are there for balls of 3 mm radius of CL2000X or CL2003X on the \
+        "finite-element contacts exist only for balls of 3 mm radius of CL2000X or CL2003X on the \
          default waveguide: give others as tabulated states"
     )]
     NoFiniteElements,
@@ -80,15 +80,15 @@ pub enum SimulateError {
     /// A frame of the calibration is too bright for the camera, so its sum would not be
     /// proportional to the force.
     #[error(
-        "at {force_n} N the calibration's indenter lights pixels beyond the camera's range: take \
-         a larger indenter, or a smaller force"
+        "at {force_n} N the indenter of the calibration saturates pixels of the camera: take a \
+         larger indenter or a smaller force"
     )]
     CalibrationSaturates {
         /// The smallest force of the calibration at which pixels saturate.
         force_n: f64,
     },
     /// A load is too large for an equilibrium under the material law.
-    #[error("the force {force_n} N exceeds {limit_n} N, the largest the material law can carry")]
+    #[error("the force {force_n} N exceeds {limit_n} N, the largest force of the material law")]
     Overload {
         /// The requested force.
         force_n: f64,

@@ -214,7 +214,7 @@ impl PressScene {
 /// let light = |scene: &PressScene| scene.truth(0).integrated_pixel_value;
 /// assert!(
 ///     (light(&first) / light(&same_sensor) - 4.0).abs() < 1e-9,
-///     "light in proportion to force"
+///     "light proportional to force"
 /// );
 /// # Ok::<(), tactile_simulate::SimulateError>(())
 /// ```
@@ -406,7 +406,7 @@ impl PressOptions {
 ///     .collect::<Vec<_>>();
 /// assert!(
 ///     (light[1] / light[0] / (1.2 / 0.7) - 1.0).abs() < 0.02,
-///     "light in proportion to force"
+///     "light proportional to force"
 /// );
 /// assert_eq!(made.youngs_modulus_pa, 103e3);
 /// # Ok::<(), tactile_simulate::SimulateError>(())

@@ -64,7 +64,7 @@ impl GuideCheck {
         }
         let poisson = ball.poisson_ratio;
         if !(is_known(poisson) && poisson.value > -1.0 && poisson.value <= 0.5) {
-            return Err("the ball's Poisson ratio must be above -1 and at most 0.5");
+            return Err("the ball's Poisson's ratio must be above -1 and at most 0.5");
         }
         Ok(Self {
             ball,

@@ -25,7 +25,7 @@ use crate::error::{ElasticityError, Quantity};
 /// // A force of 0.1 N on a disc of 1 mm indents a half-space of E* = 100 kPa by 3F/(4aE*).
 /// let depth = depression_m(&guide, Bond::Bonded, 0.1, 1e-3, &[0.0, 40e-3])?;
 /// assert!(depth[0] < 0.75e-3 && depth[0] > 0.6e-3, "less, for the rigid base");
-/// assert!(depth[1].abs() < 1e-6, "far away nothing moves");
+/// assert!(depth[1].abs() < 1e-6, "no displacement far away");
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 ///

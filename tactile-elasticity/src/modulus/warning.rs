@@ -99,14 +99,14 @@ impl core::fmt::Display for Warning {
         match self {
             Self::LargeContact { load, ratio, limit } => write!(
                 f,
-                "load {}: a/R = {ratio:.3} is beyond {limit:.2}, \
-                     small-contact theory does not hold",
+                "load {}: a/R = {ratio:.3} is above {limit:.2}, \
+                     small-contact theory is not valid",
                 load + 1
             ),
             Self::ThinLayer { load, ratio, limit } => write!(
                 f,
                 "load {}: contact over layer thickness = {ratio:.3} \
-                     is beyond {limit:.2} for this law",
+                     is above the limit {limit:.2} of this law",
                 load + 1
             ),
             Self::LargeStrain {
@@ -115,8 +115,8 @@ impl core::fmt::Display for Warning {
                 limit,
             } => write!(
                 f,
-                "load {}: strain {strain:.3} is beyond {limit:.2}, \
-                     the linear law does not hold",
+                "load {}: strain {strain:.3} is above {limit:.2}, \
+                     the linear law is not valid",
                 load + 1
             ),
             Self::ExcessScatter {
@@ -151,17 +151,17 @@ impl core::fmt::Display for Warning {
                 write!(
                     f,
                     "the sample is {times:.0} times {word} than the guide: are its layers, the \
-                     forces, the radius and the size of a pixel in the units asked for?"
+                     forces, the radius and the pixel size in the expected units?"
                 )
             }
             Self::OutOfReach { load } => write!(
                 f,
-                "load {}: the contact is beyond what the law describes, and was not used",
+                "load {}: the contact is outside the range of the law and was not used",
                 load + 1
             ),
             Self::GuideIgnored => write!(
                 f,
-                "the estimator takes the guide for rigid: the modulus is that of sample and guide \
+                "the estimator treats the guide as rigid: the modulus is that of sample and guide \
                  together"
             ),
             Self::NegativePoissonRatio { poisson_ratio } => write!(

@@ -155,7 +155,7 @@ impl FaceReading {
 pub enum ShapeProblem {
     /// The pressure falls to zero at the outline, as under a ball.
     #[error(
-        "the pressure falls off towards the outline ({edge_ratio:.2} of that further inside), as \
+        "the pressure falls towards the outline (to {edge_ratio:.2} times that further inside), as \
          under a ball: give shape = \"sphere\" with its radius_m"
     )]
     NoEdge {
@@ -164,8 +164,8 @@ pub enum ShapeProblem {
     },
     /// The pressure rises towards the outline.
     #[error(
-        "the pressure rises towards the outline ({edge_ratio:.2} of that further inside), as under \
-         a stiff punch or a face that sticks: give shape = \"flat_punch\", or press with less \
+        "the pressure rises towards the outline (to {edge_ratio:.2} times that further inside), as \
+         under a stiff punch or a face that sticks: give shape = \"flat_punch\", or press with less \
          friction"
     )]
     RaisedEdge {
@@ -190,14 +190,14 @@ pub enum ShapeProblem {
     },
     /// The contact is too small or too irregular to have an interior.
     #[error(
-        "the contact is too small for its outline to be told from its inside: it takes some 20 \
-         pixels across"
+        "the contact is too small to separate its outline from its inside: about 20 pixels across \
+         are needed"
     )]
     TooSmall,
     /// The contact grows more than the face of a compressed specimen.
     #[error(
-        "the contact grows by {:.0} % since the first load, more than a squeezed face: a round \
-         object; give its shape",
+        "the contact has grown by {:.0} % since the first load, more than a compressed face can: \
+         the object is round; give its shape",
         100.0 * .growth
     )]
     Grows {
@@ -206,8 +206,8 @@ pub enum ShapeProblem {
     },
     /// The outline changes its shape from load to load.
     #[error(
-        "the outline does not keep its shape ({:+.1} % in second moment since the first load): no \
-         uniaxial load; give the object's shape",
+        "the outline changes its shape ({:+.1} % in second moment since the first load): the load \
+         is not uniaxial; give the object's shape",
         100.0 * .change
     )]
     OutlineChanges {
@@ -216,8 +216,8 @@ pub enum ShapeProblem {
     },
     /// The pressure changes its distribution from load to load.
     #[error(
-        "the pressure does not keep its distribution ({:+.1} % in second moment since the first \
-         load): friction, tilt or an object of another shape",
+        "the pressure changes its distribution ({:+.1} % in second moment since the first load): \
+         friction, tilt or an object of another shape",
         100.0 * .change
     )]
     PressureChanges {
