@@ -1,4 +1,4 @@
-//! NumPy arrays in and out. They are read in place where their type and layout allow.
+//! Conversion of NumPy arrays. They are read in place if their type and layout allow it.
 use crate::errors::invalid;
 use nalgebra::{Matrix3, Point};
 use ndarray::{Array1, Array2, Array3, ArrayView2, Dimension};
@@ -8,7 +8,7 @@ use numpy::{
 };
 use pyo3::prelude::*;
 
-/// What NumPy makes of an argument, whose kind of numbers is one of `kinds`, as `dtype`.
+/// Converts an argument with NumPy to `dtype`. Its kind of numbers must be one of `kinds`.
 fn read<'py, T: Element>(
     name: &str,
     given: &Bound<'py, PyAny>,
@@ -24,12 +24,12 @@ fn read<'py, T: Element>(
             "{name} must be an array of {dtype}, found {found}"
         )));
     }
-    // Aligned and in the machine's order of bytes, copied only where it is not.
+    // Aligned and in native byte order, copied only if necessary.
     let aligned = numpy.call_method1("require", (array, dtype, "A"))?;
     aligned.extract()
 }
 
-/// What NumPy makes of an argument. A mask would be lost.
+/// An argument converted by NumPy. An array with a mask is an error, because the mask would be lost.
 pub(crate) fn asarray<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     unmasked(name, given)?;
     let array = given
@@ -61,7 +61,7 @@ fn axes(name: &str, expected: &str, shape: &[usize]) -> PyErr {
     ))
 }
 
-/// An array of two axes. NumPy's own are read in place where they are aligned and lie in a row.
+/// An array of two axes. Aligned and contiguous NumPy arrays are read in place.
 fn two_axes<'py, T: Element>(
     name: &str,
     given: &Bound<'py, PyAny>,
@@ -101,7 +101,7 @@ pub(crate) fn mask(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array2<bool
     Ok(owned(array.as_array()))
 }
 
-/// A frame: a matrix of bytes, [row, column]. Other numbers are refused, because a cast would wrap.
+/// A frame: a matrix of bytes, [row, column]. Other numbers are an error, because a cast would wrap.
 pub(crate) fn frame<'py>(
     name: &str,
     given: &Bound<'py, PyAny>,
@@ -117,7 +117,7 @@ pub(crate) fn frame<'py>(
     two_axes(name, given, "u", "uint8")
 }
 
-/// A frame of red, green and blue in some order: bytes, [row, column, channel].
+/// A colour frame with any order of channels: bytes, [row, column, channel].
 pub(crate) fn colours(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array3<u8>> {
     let array = bytes(name, given)?;
     let shape = array.shape().to_vec();
@@ -132,7 +132,7 @@ pub(crate) fn colours(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array3<u
     }
 }
 
-/// Grey levels of a frame of bytes, the mean of its channels.
+/// Grey levels of a frame of bytes: the mean of its channels.
 pub(crate) fn grey(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array2<f64>> {
     let array = bytes(name, given)?;
     let levels = array.as_array().mapv(f64::from);
@@ -156,7 +156,7 @@ fn bytes<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray
     read(name, &found, "u", "uint8")
 }
 
-/// A copy. ndarray refuses NumPy's strides of an array without elements.
+/// A copy. ndarray does not accept NumPy's strides of an array without elements.
 pub(crate) fn owned<T: Clone + Default>(view: ArrayView2<'_, T>) -> Array2<T> {
     match view.is_empty() {
         true => Array2::default(view.dim()),
@@ -235,14 +235,14 @@ pub(crate) fn tensor(rows: ArrayView2<'_, f64>) -> Matrix3<f64> {
     Matrix3::from_fn(|i, j| rows[[i, j]])
 }
 
-/// An array that nobody can change, as a part of a frozen result.
+/// A read-only array, as a part of a frozen result.
 pub(crate) fn kept<T: Element, D: Dimension>(
     py: Python<'_>,
     array: ndarray::Array<T, D>,
 ) -> Py<PyArray<T, D>> {
     let array = PyArray::from_owned_array(py, array);
     if let Ok(flags) = array.getattr("flags") {
-        // An array of its own accepts this, and one that did not would still be right.
+        // A new array accepts this, and the result would be correct without it.
         let _ = flags.setattr("writeable", false);
     }
     array.unbind()

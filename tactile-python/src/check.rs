@@ -1,4 +1,4 @@
-//! Presses of known force beside the frames.
+//! Presses of known force in addition to the frames.
 use crate::arrays;
 use ndarray::Array2;
 use pyo3::prelude::*;
@@ -8,9 +8,8 @@ use tactile_imaging::pipeline::{self as rust, CheckedObject, KnownBall};
 
 /// A press of known force, before or after the frames, for `Pipeline.with_checks`.
 ///
-/// Forces in newtons, lengths in metres, moduli in pascals. Errors are standard errors. Those that
-/// are not given are assumed: 0.2 % of a force, 0.5 % of a radius, 2 % of a modulus, 0.01 of
-/// Poisson's ratio.
+/// Forces are in newtons, lengths in metres and moduli in pascals. Errors are standard errors, with
+/// the defaults 0.2 % of a force, 0.5 % of a radius, 2 % of a modulus and 0.01 of Poisson's ratio.
 #[pyclass(frozen, module = "tactile_imaging")]
 pub(crate) struct CheckPress {
     pub frame: Array2<u8>,
@@ -35,7 +34,7 @@ impl CheckPress {
 
 #[pymethods]
 impl CheckPress {
-    /// Of the object that is measured: the gain of the light, and what the object couples.
+    /// A press of the measured object, which gives the gain of the light and the optical coupling.
     #[classmethod]
     #[pyo3(signature = (frame, force, *, force_error=None))]
     fn sample(
@@ -47,7 +46,7 @@ impl CheckPress {
         Self::new(frame, force, force_error, CheckedObject::Sample)
     }
 
-    /// Of the object that the sensor was calibrated with: the gain of the light.
+    /// A press of the calibration object, which gives the gain of the light.
     #[classmethod]
     #[pyo3(signature = (frame, force, *, force_error=None))]
     fn calibrator(
@@ -59,8 +58,8 @@ impl CheckPress {
         Self::new(frame, force, force_error, CheckedObject::Calibrator)
     }
 
-    /// Of a ball of known radius and modulus: the layers of the waveguide. Without a modulus the
-    /// ball is rigid.
+    /// A press of a ball of known radius and modulus, which gives the layers of the waveguide. The
+    /// ball is rigid if no modulus is given.
     #[classmethod]
     #[pyo3(signature = (
         frame, force, radius, *, force_error=None, radius_error=None, youngs_modulus=None,

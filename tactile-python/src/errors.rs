@@ -1,4 +1,4 @@
-//! Exceptions: by kind, with the sentence of the error, and with the Python error that caused it.
+//! Exceptions: by kind, with the message of the error and the Python exception that caused it.
 use pyo3::exceptions::{PyException, PyIndexError, PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use std::error::Error;
@@ -22,13 +22,14 @@ pyo3::create_exception!(
     "Valid input without an answer: no contact, too few matches, a stage in Python that failed."
 );
 
-/// An argument that a caller has to change.
+/// The exception for an invalid argument.
 pub(crate) fn invalid(sentence: impl ToString) -> PyErr {
     PyValueError::new_err(sentence.to_string())
 }
 
-/// The exception of a stage in Python that an error carries, as the cause of one with the error's
-/// sentence. What is no `Exception`, as `KeyboardInterrupt`, is raised itself.
+/// If an error contains the exception of a stage in Python: an exception with the message of the
+/// error, caused by it. Other exceptions than `Exception`, such as `KeyboardInterrupt`, are raised
+/// unchanged.
 fn caused(error: &(dyn Error + 'static)) -> Option<PyErr> {
     let mut link = error;
     let cause = loop {
@@ -48,7 +49,7 @@ fn caused(error: &(dyn Error + 'static)) -> Option<PyErr> {
     }))
 }
 
-/// The failure of a caller's own stage that an error of a crate is.
+/// The failure of a user-defined stage in an error of a crate.
 fn own_failure<'e>(error: &'e (dyn Error + 'static)) -> Option<&'e CustomError> {
     macro_rules! of {
         ($($kind:ident),*) => {
@@ -61,12 +62,12 @@ fn own_failure<'e>(error: &'e (dyn Error + 'static)) -> Option<&'e CustomError> 
     None
 }
 
-/// A failure of a measurement.
+/// The exception for a failed measurement.
 pub(crate) fn failed(error: impl Error + 'static) -> PyErr {
     caused(&error).unwrap_or_else(|| TactileError::new_err(error.to_string()))
 }
 
-/// An error that a caller mends by other arguments, unless a stage in Python failed.
+/// The exception for an error caused by the arguments, unless a stage in Python failed.
 pub(crate) fn refused(error: impl Error + 'static) -> PyErr {
     caused(&error).unwrap_or_else(|| invalid(error))
 }
@@ -80,8 +81,8 @@ pub(crate) fn pipeline(error: PipelineError) -> PyErr {
     })
 }
 
-/// A sentence of the library, which counts frames from one, with the numbers of the calls, which
-/// count from zero.
+/// A message of the library, which counts frames from one, with the frame numbers of the calls,
+/// which count from zero.
 pub(crate) fn from_zero(sentence: &str) -> String {
     let mut after = "";
     let words = sentence.split_inclusive(' ').map(|word| {
@@ -126,7 +127,7 @@ pub(crate) fn sensor(error: SensorError) -> PyErr {
     }
 }
 
-/// Lets `KeyboardInterrupt` end long work: asked at every step of it, which it looks for at times.
+/// Lets `KeyboardInterrupt` stop long computations: called at every step, it checks from time to time.
 pub(crate) struct Signals {
     looked: Instant,
     raised: Option<PyErr>,
@@ -140,10 +141,10 @@ impl Signals {
         }
     }
 
-    /// Whether the work goes on.
+    /// Whether the computation continues.
     pub(crate) fn check(&mut self) -> ControlFlow<()> {
-        // Rare enough to cost nothing, often enough for a person.
-        // What was raised once stays raised until `finish`, however often the work asks again.
+        // Rare enough for negligible cost, and often enough for a user. A raised exception is kept
+        // until `finish`, however often `check` is called again.
         if self.raised.is_none() && self.looked.elapsed() > Duration::from_millis(50) {
             self.looked = Instant::now();
             self.raised = Python::attach(|py| py.check_signals().err());
@@ -158,7 +159,7 @@ impl Signals {
         self.raised.take().map_or(Ok(()), Err)
     }
 
-    /// Works without the interpreter's lock, until it is done or `KeyboardInterrupt` ends it.
+    /// Runs without the interpreter lock, until the end or a `KeyboardInterrupt`.
     pub(crate) fn during<T: Send>(
         py: Python<'_>,
         work: impl Send + FnOnce(&mut Self) -> T,

@@ -1,4 +1,4 @@
-//! Gels that are lit in colours, and markers printed on gels: from arrays.
+//! Gels under coloured light, and markers printed on gels, from arrays.
 use crate::arrays::{self, Matrix, kept};
 use crate::errors::{self, TactileError, invalid};
 use crate::results::{Estimate, GelContact, GelReport, Markers, of_values};
@@ -14,7 +14,7 @@ use tactile_imaging::gel::{
 };
 use tactile_imaging::matching::MatchError;
 
-/// A gel that is lit in colours: from frames to the face, contacts and forces.
+/// A gel under coloured light: from frames to surface, contacts and forces.
 #[pyclass(frozen, module = "tactile_imaging")]
 pub(crate) struct GelSensor {
     gel: CalibratedGel,
@@ -23,7 +23,7 @@ pub(crate) struct GelSensor {
     report: Option<Py<GelReport>>,
 }
 
-/// Order of a frame's channels.
+/// Order of the channels of a frame.
 #[derive(Clone, Copy)]
 enum Order {
     Rgb,
@@ -56,7 +56,7 @@ impl Order {
         }
     }
 
-    /// What a doubt means for a caller, with the argument that mends it.
+    /// The message of a doubt, with the argument that resolves it.
     fn sentence(self, doubt: &FrameDoubt) -> String {
         let other = match self {
             Self::Rgb => "bgr",
@@ -73,27 +73,27 @@ impl Order {
 
 #[pymethods]
 impl GelSensor {
-    /// Calibrates by presses of a ball.
+    /// Calibrates the sensor with presses of a ball.
     ///
     /// Parameters
     /// ----------
     /// reference : (rows, columns, 3) array of uint8
     ///     Frame without contact.
     /// presses : sequence of (rows, columns, 3) arrays of uint8
-    ///     Five to twenty frames of the ball at many places.
+    ///     Five to twenty frames of the ball at different positions.
     /// ball_radius : float or (n,) array
-    ///     Metres.
+    ///     Radius of the ball, or of the ball of each press, in metres.
     /// pixel_size : float
     ///     Size of a pixel on the gel in metres.
     /// order : str
-    ///     "rgb", or "bgr" for frames of OpenCV, here and in `read`.
+    ///     "rgb", or "bgr" for frames from OpenCV, here and in `read`.
     /// circles : (n, 3) array
-    ///     x, y and radius of the contacts in pixels, NaN where they are not known. They are found.
+    ///     x, y and radius of the contacts in pixels. Those that are NaN are determined.
     /// layer : (thickness, Poisson's ratio, Young's modulus, its standard error)
-    ///     The gel in metres and pascals, for forces.
+    ///     The gel, in metres and pascals. Needed for forces.
     /// gauge : sequence of (frame, force)
-    ///     Four or more frames of one body and what a gauge read under them in newtons, for forces
-    ///     where the layer is not known.
+    ///     Four or more frames of one body with gauge readings in newtons. They give forces if the
+    ///     layer is not known.
     #[classmethod]
     #[pyo3(signature = (
         reference, presses, *, ball_radius, pixel_size, order="rgb", circles=None, layer=None,
@@ -173,7 +173,7 @@ impl GelSensor {
         Self::new(py, gel, order, Some(report))
     }
 
-    /// Calibrates by the presses that a calibration file names, as `tactile calibrate` does.
+    /// Calibrates with the presses listed in a calibration file, like `tactile calibrate`.
     #[classmethod]
     #[pyo3(signature = (path, *, order="rgb"))]
     fn calibrate_file(
@@ -189,7 +189,7 @@ impl GelSensor {
         Self::new(py, gel, order, Some(report))
     }
 
-    /// Reads a sensor file, as `save` and `tactile calibrate` write it.
+    /// Reads a sensor file written by `save` or `tactile calibrate`.
     #[classmethod]
     #[pyo3(signature = (path, *, order="rgb"))]
     fn load(
@@ -203,18 +203,18 @@ impl GelSensor {
         Self::new(py, gel, order, None)
     }
 
-    /// Writes the sensor file, TOML, and the frame without contact beside it.
+    /// Writes the sensor file (TOML), and the frame without contact next to it.
     fn save(&self, path: PathBuf) -> PyResult<()> {
         self.gel.write(path).map_err(errors::file)
     }
 
-    /// The face, the contacts and the forces of a frame.
+    /// Computes the surface, the contacts and the forces of a frame.
     ///
     /// Raises
     /// ------
     /// TactileError
-    ///     The frame is not this sensor's: black, white, noise, turned, of another unit, or with
-    ///     its channels in another order.
+    ///     The frame does not come from this sensor: black, white, noise, rotated, of another unit,
+    ///     or with another order of channels.
     fn read(&self, py: Python<'_>, frame: &Bound<'_, PyAny>) -> PyResult<GelFrame> {
         let frame = arrays::colours("frame", frame)?;
         let found = py.detach(|| {
@@ -236,7 +236,7 @@ impl GelSensor {
         GelFrame::new(py, frame, flags, &each, force, self.pixel_size())
     }
 
-    /// How the presses were read. None of a sensor that was loaded.
+    /// Report of the calibration. None for a sensor that was loaded.
     #[getter]
     fn report(&self, py: Python<'_>) -> Option<Py<GelReport>> {
         self.report.as_ref().map(|report| report.clone_ref(py))
@@ -306,28 +306,28 @@ impl GelSensor {
     }
 }
 
-/// What one frame of a gel shows.
+/// The results of one frame of a gel.
 #[pyclass(frozen, module = "tactile_imaging")]
 pub(crate) struct GelFrame {
-    /// How far the face has moved into the gel in metres, zero far away.
+    /// Displacement of the surface into the gel in metres, zero far from contacts.
     #[pyo3(get)]
     depth: Matrix<f64>,
     /// ∂depth/∂x along a row and ∂depth/∂y down the rows.
     #[pyo3(get)]
     gradient: (Matrix<f32>, Matrix<f32>),
-    /// Standard error of the depth of a pixel, and that of the level that all count from.
+    /// Standard errors of the depth of a pixel and of the common zero level.
     #[pyo3(get)]
     depth_error: (f64, f64),
-    /// The contact of each pixel, from 1 in the order of `contacts`. 0 where nothing touches.
+    /// The contact of each pixel, from 1 in the order of `contacts`, and 0 without contact.
     #[pyo3(get)]
     labels: Matrix<u16>,
-    /// Places where something touches, that of the highest pressure first.
+    /// The contacts, with that of the highest pressure first.
     #[pyo3(get)]
     contacts: Vec<Py<GelContact>>,
-    /// Normal force of all contacts in newtons, of sensors with a layer.
+    /// Normal force of all contacts in newtons, for sensors with a layer.
     #[pyo3(get)]
     force: Option<Py<Estimate>>,
-    /// What is doubtful about it, a sentence each.
+    /// Doubts about the result, one sentence each.
     #[pyo3(get)]
     flags: Vec<String>,
     pixel_size: f64,
@@ -345,7 +345,7 @@ const FIELDS: [&str; 7] = [
 
 #[pymethods]
 impl GelFrame {
-    /// Unit normals of the face, (rows, columns, 3). z points to the object.
+    /// Unit normals of the surface, (rows, columns, 3). z points to the object.
     fn normals<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f32>> {
         let (p, q) = (
             self.gradient.0.bind(py).readonly(),
@@ -355,7 +355,7 @@ impl GelFrame {
         let (rows, columns) = p.dim();
         let mut normals = Array3::zeros((rows, columns, 3));
         for ((at, p), q) in p.indexed_iter().zip(&q) {
-            // The depth grows away from the object.
+            // The depth increases away from the object.
             let length = (1.0 + p * p + q * q).sqrt();
             for (k, part) in [*p, *q, 1.0].into_iter().enumerate() {
                 normals[[at.0, at.1, k]] = part / length;
@@ -364,7 +364,7 @@ impl GelFrame {
         PyArray3::from_owned_array(py, normals)
     }
 
-    /// The face as points in metres, (rows × columns, 3): x, y, and z to the object.
+    /// The surface as points in metres, (rows × columns, 3): x, y, and z to the object.
     fn points<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         let depth = self.depth.bind(py).readonly();
         let depth = depth.as_array();
@@ -377,13 +377,13 @@ impl GelFrame {
         PyArray2::from_owned_array(py, points)
     }
 
-    /// The depth with the outlines of the contacts, as a figure of matplotlib.
+    /// Plots the depth with the outlines of the contacts, as a matplotlib figure.
     fn plot<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let plots = slf.py().import("tactile_imaging._plot")?;
         plots.call_method1("plot_gel", (slf,))
     }
 
-    /// The fields by name. Plain ones are numbers, text and lists alone.
+    /// The fields by name. With `plain` they contain only numbers, text and lists.
     #[pyo3(signature = (*, plain=false))]
     fn to_dict<'py>(slf: &Bound<'py, Self>, plain: bool) -> PyResult<Bound<'py, PyAny>> {
         of_values(slf.py(), "to_dict", (slf, plain, FIELDS.to_vec()))
@@ -448,7 +448,7 @@ impl GelFrame {
     }
 }
 
-/// Markers printed on a gel, followed from a reference to a frame.
+/// Follows the markers printed on a gel from a reference to a frame.
 ///
 /// Parameters
 /// ----------
@@ -457,7 +457,7 @@ impl GelFrame {
 /// Returns
 /// -------
 /// Markers
-///     Places and displacements of the markers that are seen in both.
+///     Positions and displacements of the markers that are visible in both.
 #[pyfunction]
 pub(crate) fn markers(
     py: Python<'_>,

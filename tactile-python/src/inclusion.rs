@@ -14,12 +14,12 @@ use tactile_imaging::inclusion::{
 };
 use tactile_imaging::pipeline::with_error;
 
-/// Searches for a lump in a block by the frames that a scene file names, as `tactile inclusion`.
+/// Searches for a lump in a block with the frames of a scene file, like `tactile inclusion`.
 ///
 /// Raises
 /// ------
 /// OSError, ValueError
-///     A file that cannot be read, or not be used.
+///     A file that cannot be read or used.
 #[pyfunction]
 pub(crate) fn inclusion_of_scene(py: Python<'_>, path: PathBuf) -> PyResult<Inclusion> {
     let scene = InclusionScene::read(path).map_err(errors::file)?;
@@ -31,27 +31,27 @@ pub(crate) fn inclusion_of_scene(py: Python<'_>, path: PathBuf) -> PyResult<Incl
     result(py, &found.map_err(errors::refused)?)
 }
 
-/// Searches for a lump in a block that a round guide was pressed onto.
+/// Searches for a lump in a block onto which a round guide was pressed.
 ///
 /// Parameters
 /// ----------
 /// radii : (n,) array
 ///     Distances from the axis in metres.
 /// approaches : (k,) array
-///     How far the guide was moved against the block in metres, growing.
+///     Displacement of the guide towards the block in metres, increasing.
 /// pressures, standard_errors : (k, n) arrays
 ///     Mean pressure at each distance and its standard error, in pascals.
 /// forces : (k,) array
-///     Newtons that a gauge read.
+///     Gauge readings in newtons.
 /// block_height, block_radius, guide_radius : float
-///     Metres.
+///     In metres.
 /// waveguide : (m, 3) array
-///     The guide's layers from the block's side: thickness, Young's modulus, Poisson's ratio below
-///     0.5.
+///     The layers of the guide from the side of the block: thickness, Young's modulus, and Poisson's
+///     ratio below 0.5.
 /// interface : str
-///     "bonded" or "frictionless", how the block meets the guide. Both are tried where it is None.
+///     Contact between block and guide: "bonded" or "frictionless". If it is None, both are tried.
 /// youngs_modulus : (value, standard error)
-///     Of the block in pascals, where it is known.
+///     Modulus of the block in pascals, if it is known.
 ///
 /// Returns
 /// -------

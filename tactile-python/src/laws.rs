@@ -1,4 +1,4 @@
-//! Contact laws: forward, and moduli from forces and contact radii.
+//! Contact laws: forces and radii of contacts, and moduli from them.
 use crate::arrays;
 use crate::errors::{self, invalid};
 use crate::pipeline::{Object, guide};
@@ -17,13 +17,13 @@ use tactile_imaging::pipeline::{LightContact, StagesConfig};
 /// Parameters
 /// ----------
 /// force : float
-///     Newtons.
+///     Force in newtons.
 /// radius : float
-///     Of the ball in metres.
+///     Radius of the ball in metres.
 /// youngs_modulus, poisson_ratio : float
-///     Of the ball. Pascals.
+///     Modulus of the ball in pascals, and its Poisson's ratio.
 /// other_modulus, other_poisson_ratio : float
-///     Of the flat, which is rigid where the modulus is None.
+///     Those of the flat, which is rigid if the modulus is None.
 #[pyfunction]
 #[pyo3(signature = (
     force, radius, youngs_modulus, *, poisson_ratio=0.5, other_modulus=None,
@@ -54,17 +54,17 @@ pub(crate) fn hertz(
     })
 }
 
-/// Young's modulus from forces and contact radii by a contact law.
+/// Computes Young's modulus from forces and contact radii by a contact law.
 ///
 /// Parameters
 /// ----------
 /// forces, radii : (n, 2) arrays
-///     Newtons and metres, each with its standard error.
+///     Forces in newtons and radii in metres, each with its standard error.
 /// object : Object
 /// waveguide : (k, 3) array
-///     As that of `Pipeline`.
+///     As in `Pipeline`.
 /// estimator : str
-///     As that of `Pipeline`.
+///     As in `Pipeline`.
 #[pyfunction]
 #[pyo3(signature = (forces, radii, object, *, waveguide=None, estimator=None))]
 pub(crate) fn estimate_modulus(

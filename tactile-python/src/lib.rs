@@ -1,5 +1,5 @@
 //! The module `tactile_imaging._native` of the Python package `tactile_imaging`.
-// Keywords of Python are arguments here.
+// Keyword arguments in Python are arguments here.
 #![allow(clippy::too_many_arguments)]
 
 mod arrays;
@@ -20,8 +20,8 @@ mod surfaces;
 
 use pyo3::prelude::*;
 
-/// Runs the program `tactile` on arguments, of which the first is its own name, and returns its
-/// exit code.
+/// Runs the program `tactile` and returns its exit code. The first argument is the name of the
+/// program.
 #[pyfunction]
 fn run_program(py: Python<'_>, arguments: Vec<String>) -> u8 {
     py.detach(|| tactile_cli::run_with(arguments))

@@ -26,10 +26,10 @@ use tactile_imaging::{
     strain_between as strain_of_sets,
 };
 
-/// Most places of a grid: 600 MB.
+/// Maximum number of points of a grid: 600 MB.
 const MOST_PLACES: f64 = 4e6;
 
-/// A matcher as the caller gave it: read once, made for the plane or for space.
+/// The matcher given by the caller: parsed once, created for the plane or for space.
 pub(crate) enum Matcher {
     Annealed(AnnealedSoftassign),
     Drift(CoherentPointDrift),
@@ -39,7 +39,7 @@ pub(crate) enum Matcher {
     Own(OwnStage),
 }
 
-/// Options of a matcher by name, taken one after the other.
+/// Options of a matcher by name, removed one after the other.
 struct Options<'py>(Vec<(String, Bound<'py, PyAny>)>);
 
 impl<'py> Options<'py> {
@@ -78,7 +78,7 @@ impl<'py> Options<'py> {
         chosen.map(|(_, choice)| Some(*choice)).ok_or_else(unknown)
     }
 
-    /// Refuses what is left.
+    /// An error if options remain.
     fn finish(self, matcher: &str) -> PyResult<()> {
         match self.0.first() {
             Some((option, _)) => Err(PyTypeError::new_err(format!(
@@ -90,9 +90,9 @@ impl<'py> Options<'py> {
 }
 
 impl Matcher {
-    /// From a name with options, or from an object with a method `match_points`.
+    /// Creates a matcher from a name with options, or from an object with a method `match_points`.
     ///
-    /// `annealed` is what the default matcher starts from.
+    /// `annealed` is the configuration from which the default matcher starts.
     pub(crate) fn new(
         given: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
@@ -133,7 +133,7 @@ impl Matcher {
         Ok(matcher)
     }
 
-    /// For a stage of a pipeline.
+    /// Creates the matcher for a stage of a pipeline.
     pub(crate) fn boxed<const D: usize>(self) -> Box<dyn PointMatcher<D> + Send + Sync> {
         match self {
             Self::Annealed(matcher) => Box::new(matcher),
@@ -305,7 +305,7 @@ fn rows_of_pairs(pairs: &[(usize, usize)]) -> Array2<i64> {
     Array2::from_shape_fn((pairs.len(), 2), side)
 }
 
-/// Finds which point of the model is which point of the target.
+/// Matches the points of a model to those of a target.
 ///
 /// Parameters
 /// ----------
@@ -316,16 +316,16 @@ fn rows_of_pairs(pairs: &[(usize, usize)]) -> Array2<i64> {
 /// matcher : str or object
 ///     "annealed-softassign" (the default), "coherent-point-drift", "relaxation-labelling" (the
 ///     paper's), "linear-assignment", "nearest-neighbour", or an object with a method
-///     `match_points(model, target)` that returns the target row of every model point, -1 for none,
-///     or a tuple of these rows and a confidence for each.
+///     `match_points(model, target)`. It returns the target row of every model point (-1 for none),
+///     or a tuple of these rows and their confidences.
 /// **options
-///     Of "annealed-softassign": `rotation` ("limited", "any"), `outliers` ("both", "model",
+///     For "annealed-softassign": `rotation` ("limited", "any"), `outliers` ("both", "model",
 ///     "target", "none"), `transformation` ("smooth", "affine", "similarity", "rigid"),
-///     `outlier_ratio` (0.1), `largest_motion`, `max_iterations` (200). Of
+///     `outlier_ratio` (0.1), `largest_motion`, `max_iterations` (200). For
 ///     "coherent-point-drift": `beta` (2), `lambda_` (3), `rank`, `outlier_weight` (0.1),
-///     `tolerance`, `max_iterations`, `normalization` ("each", "model", "off"). Of
+///     `tolerance`, `max_iterations`, `normalization` ("each", "model", "off"). For
 ///     "relaxation-labelling": `neighbours`, `compatibility`, `length_maximum`, `temperature`,
-///     `slack`, `smoothing`, `candidates`, `max_iterations`. Of the other two: `max_distance`.
+///     `slack`, `smoothing`, `candidates`, `max_iterations`. For the other two: `max_distance`.
 ///
 /// Returns
 /// -------
@@ -334,11 +334,11 @@ fn rows_of_pairs(pairs: &[(usize, usize)]) -> Array2<i64> {
 /// Raises
 /// ------
 /// ValueError
-///     Empty sets, coordinates that are not finite, options out of range.
+///     Empty sets, coordinates that are not finite, or options out of range.
 /// TypeError
 ///     Options that the matcher does not have.
 /// TactileError
-///     A matcher of your own failed. Its exception is the cause.
+///     A user-defined matcher failed. Its exception is the cause.
 #[pyfunction]
 #[pyo3(signature = (model, target, matcher=None, **options))]
 pub(crate) fn match_points(
@@ -377,7 +377,7 @@ fn matched<const D: usize>(
     ))
 }
 
-/// Strain of a point set on its way to another: match, local field, Green-Lagrange strain.
+/// Computes the strain between two point sets by a match, a local field and a strain measure.
 ///
 /// Parameters
 /// ----------
@@ -386,28 +386,28 @@ fn matched<const D: usize>(
 /// after : (m, 2) or (m, 3) array
 ///     Points in the same unit.
 /// matcher, **options
-///     As those of `match_points`.
+///     As in `match_points`.
 /// measure : str or object
 ///     "green-lagrange", "euler-almansi", "hencky", "biot", "infinitesimal", or an object with a
 ///     method `strain(deformation_gradient)` that returns a 3 × 3 tensor.
 /// paired : bool
-///     Whether row i of `after` is row i of `before`, as of finite elements, image correlation or a
-///     tracker. Nothing is matched, and rows with NaN are skipped.
+///     Whether row i of `after` belongs to row i of `before`, as in results of finite elements, image
+///     correlation or a tracker. The points are then not matched, and rows with NaN are skipped.
 /// with_doubtful_pairs : bool
-///     Whether pairs that are not to be relied on give a strain with a flag instead of an error.
+///     Whether unreliable pairs give a strain with a flag instead of an error.
 /// grid : float or (k, d) array
-///     Spacing of a grid over the box of `before`, or places: displacement and strain there are
-///     `grid` of the result.
+///     Spacing of a grid over the box of `before`, or positions. Displacement and strain at these
+///     points are `grid` of the result.
 ///
 /// Returns
 /// -------
 /// StrainBetween
-///     In the plane the third axis is undeformed.
+///     For points in the plane the third axis is undeformed.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     As `match_points`, and too few matched points.
+///     As in `match_points`, or too few matched points.
 /// TactileError
 ///     Doubtful pairs, or no smooth deformation.
 #[pyfunction]
@@ -444,25 +444,26 @@ pub(crate) fn strain_between(
     }
 }
 
-/// Strain of every frame of a series since the first: points are followed from frame to frame.
+/// Computes the strain of every frame of a series relative to the first. Points are followed from
+/// frame to frame.
 ///
 /// Parameters
 /// ----------
 /// frames : sequence of (n, 2) or (n, 3) arrays
 ///     Points in any unit. Numbers of points may differ.
 /// matcher, measure, with_doubtful_pairs, **options
-///     As those of `strain_between`.
+///     As in `strain_between`.
 ///
 /// Returns
 /// -------
 /// list of StrainBetween or None
-///     Of every frame but the first. None if too few points of the first frame are left, or their
-///     pairs are doubtful.
+///     One result for every frame after the first. None if too few points of the first frame
+///     remain, or if their pairs are doubtful.
 ///
 /// Raises
 /// ------
 /// ValueError, TactileError
-///     As `strain_between`, of two frames that follow each other.
+///     As in `strain_between`, for two consecutive frames.
 #[pyfunction]
 #[pyo3(signature = (frames, matcher=None, *, measure=None, with_doubtful_pairs=false, **options))]
 pub(crate) fn strain_series(
@@ -491,7 +492,7 @@ pub(crate) fn strain_series(
     }
 }
 
-/// What strains of points take.
+/// Arguments of the strains of points.
 struct Work {
     matcher: Matcher,
     measure: Arc<dyn StrainMeasure + Send + Sync>,
@@ -517,7 +518,7 @@ impl Work {
         })
     }
 
-    /// Computes with the options, without the interpreter's lock.
+    /// Computes with the options, without the interpreter lock.
     fn run<const D: usize, T: Send>(
         self,
         py: Python<'_>,
@@ -594,8 +595,8 @@ impl Work {
     }
 }
 
-/// The places of a grid of this spacing over the box of points, the first axis fastest, and their
-/// numbers along the axes. None of these for places that are given.
+/// The points of a grid of this spacing over the box of points, with the first axis fastest, and
+/// their numbers along the axes. No numbers if positions are given.
 fn places<const D: usize>(
     grid: &Bound<'_, PyAny>,
     points: &[Point<f64, D>],

@@ -1,4 +1,4 @@
-//! Stages written in Python: an object whose method has the name and the arguments of the trait's.
+//! Stages written in Python: objects with the method of the trait, by name and arguments.
 use crate::arrays::{self, kept_tensor};
 use crate::errors::invalid;
 use crate::results::{Estimate, Load};
@@ -23,10 +23,10 @@ use tactile_imaging::sfs::{
 };
 use tactile_imaging::tps::{TpsError, Warp, WarpModel};
 
-/// An object with the one method of a stage.
+/// An object with the method of a stage.
 ///
-/// It is held weakly, if it allows that: a pipeline or a press keeps it alive where the collector of
-/// cycles sees it, as an object that holds its own press makes one.
+/// The reference is weak if the object allows it. The pipeline or the press keeps the object alive,
+/// visible to the garbage collector, because an object that refers to its own press is a cycle.
 #[derive(Clone)]
 pub(crate) struct OwnStage {
     object: Arc<Held>,
@@ -39,7 +39,8 @@ enum Held {
 }
 
 impl OwnStage {
-    /// The stage `name` by its method: a name of a built-in one is none.
+    /// Creates the stage `name` from an object with its method. The name of a built-in stage is an
+    /// error.
     pub(crate) fn new(
         name: &str,
         method: &'static str,
@@ -77,7 +78,7 @@ impl OwnStage {
         self.object(py)?.call_method1(self.method, arguments)
     }
 
-    /// Heights of the shape that they were asked for.
+    /// Heights, which must have the requested shape.
     fn heights(
         &self,
         answer: &Bound<'_, PyAny>,
@@ -143,14 +144,14 @@ impl OwnStage {
                 }
             }
         }
-        // A row twice or a confidence that is NaN is the fault of the stage as well.
+        // A repeated row or a NaN confidence is also an error of the stage.
         Matching::from_pairs(model, target, &pairs)
             .map_err(|error| invalid(format!("match_points: {error}")))
     }
 }
 
-/// `match_points(model, target)` returns the target row of every model point, −1 for none, or that
-/// and a confidence for each, as a tuple or as the attributes `assignment` and `confidence`.
+/// `match_points(model, target)` returns the target row of every model point (−1 for none), or these
+/// rows and their confidences as a tuple or as the attributes `assignment` and `confidence`.
 impl<const D: usize> PointMatcher<D> for OwnStage {
     fn match_points(
         &self,
@@ -161,12 +162,12 @@ impl<const D: usize> PointMatcher<D> for OwnStage {
     }
 }
 
-/// Where heights are wanted, as an array.
+/// The pixels to be reconstructed, as an array.
 fn mask_of(domain: &Domain<'_, f64>, shape: (usize, usize)) -> Array2<bool> {
     Array2::from_shape_fn(shape, |(row, column)| domain.contains(row, column))
 }
 
-/// `reconstruct(image, mask, pixel_size)` returns heights in the unit of the pixel's size.
+/// `reconstruct(image, mask, pixel_size)` returns heights in the unit of the pixel size.
 impl SurfaceReconstruction<f64> for OwnStage {
     fn reconstruct(&self, image: Image<'_, '_, f64>) -> Result<Surface<f64>, SfsError> {
         let Image { values, domain } = image;
@@ -228,7 +229,7 @@ fn tensor(what: &str, answer: &Bound<'_, PyAny>) -> PyResult<Matrix3<f64>> {
     }
 }
 
-/// `strain(deformation_gradient)` returns the tensor, 3 × 3.
+/// `strain(deformation_gradient)` returns a 3 × 3 tensor.
 impl StrainMeasure for OwnStage {
     fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
         let strain = Python::attach(|py| {
@@ -243,9 +244,9 @@ impl StrainMeasure for OwnStage {
     }
 }
 
-/// `estimate(loads)` returns Young's modulus in pascals and its standard error. With a true
-/// attribute `counts_guide` it is `estimate(loads, layers)`: the guide's layers as `Pipeline` takes
-/// them, none where it is rigid.
+/// `estimate(loads)` returns Young's modulus in pascals and its standard error. If the attribute
+/// `counts_guide` is true, the call is `estimate(loads, layers)` with the layers of the guide in the
+/// format of `Pipeline`, or no layers if the guide is rigid.
 impl ModulusEstimator for OwnStage {
     fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         let estimate = Python::attach(|py| {
@@ -276,19 +277,19 @@ impl ModulusEstimator for OwnStage {
         EstimatorKind::Other("own estimator")
     }
 
-    /// The attribute `needs_strain`, true where there is none.
+    /// The attribute `needs_strain`, by default true.
     fn needs_strain(&self) -> bool {
         self.truth("needs_strain", true)
     }
 
-    /// The attribute `counts_guide`, false where there is none.
+    /// The attribute `counts_guide`, by default false.
     fn counts_guide(&self) -> bool {
         self.truth("counts_guide", false)
     }
 }
 
 impl OwnStage {
-    /// The truth of an attribute.
+    /// An attribute as a boolean.
     fn truth(&self, attribute: &str, otherwise: bool) -> bool {
         Python::attach(|py| {
             let given = self.object(py).and_then(|object| object.getattr(attribute));
@@ -299,7 +300,7 @@ impl OwnStage {
     }
 }
 
-/// Thickness, modulus and Poisson's ratio of the guide's layers, a row each.
+/// Thickness, modulus and Poisson's ratio of the layers of the guide, one row per layer.
 fn layers<'py>(py: Python<'py>, series: &LoadSeries) -> Bound<'py, PyArray2<f64>> {
     let guide = series.bodies().and_then(|bodies| bodies.guide());
     let layers = guide.map_or(&[][..], |guide| guide.layers());
@@ -314,8 +315,8 @@ fn layers<'py>(py: Python<'py>, series: &LoadSeries) -> Bound<'py, PyArray2<f64>
     PyArray2::from_owned_array(py, values)
 }
 
-/// `fit(sources, targets, weights)` returns an object that maps points to points when it is called
-/// and has a method `jacobian`: a `ThinPlateSpline` is one.
+/// `fit(sources, targets, weights)` returns a callable that maps points to points and has a method
+/// `jacobian`, for example a `ThinPlateSpline`.
 impl WarpModel<3> for OwnStage {
     fn fit(
         &self,
@@ -327,7 +328,7 @@ impl WarpModel<3> for OwnStage {
             let array = |points| PyArray2::from_owned_array(py, arrays::rows(points));
             let weights = weights.map(|weights| PyArray1::from_slice(py, weights));
             let fitted = self.call(py, (array(sources), array(targets), weights))?;
-            // Asked once at all sources, so that a warp that fails does so here.
+            // Called once at all sources, so that an invalid warp fails here.
             let warp = OwnWarp(fitted.unbind());
             warp.images(py, sources)?;
             warp.jacobians(py, sources)?;
@@ -367,8 +368,8 @@ impl OwnWarp {
     }
 }
 
-/// A warp was asked once when it was fitted. One that fails later has no way to say so but NaN,
-/// which the stages behind it refuse.
+/// A warp was called once when it was fitted. If a later call fails, the result is NaN, which the
+/// following stages refuse.
 impl Warp<3> for OwnWarp {
     fn apply(&self, point: &Point3<f64>) -> Point3<f64> {
         let image = Python::attach(|py| self.images(py, &[*point]));
@@ -403,7 +404,7 @@ impl Warp<3> for OwnWarp {
     }
 }
 
-/// Slices of a caller are as long as what the stage returned for its points.
+/// The slices of the caller must be as long as the result of the stage.
 fn same_length(input: &'static str, expected: usize, found: usize) -> Result<(), TpsError> {
     match found == expected {
         true => Ok(()),
@@ -415,9 +416,9 @@ fn same_length(input: &'static str, expected: usize, found: usize) -> Result<(),
     }
 }
 
-/// `measure(frame, reference)` returns None where nothing touches, else a dictionary: `radius` in
-/// metres and `force` in newtons or None, both as (value, standard error), `mask` of the frame's
-/// shape, and `centre` (x, y) in pixels.
+/// `measure(frame, reference)` returns a dictionary, or None if there is no contact. It contains
+/// `radius` in metres and `force` in newtons or None, both as (value, standard error), `mask` with
+/// the shape of the frame, and `centre` (x, y) in pixels.
 pub(crate) struct OwnContact {
     pub stage: OwnStage,
     pub pixel_size_m: [f64; 2],

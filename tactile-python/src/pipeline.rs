@@ -1,4 +1,4 @@
-//! The stages, by name or as objects of Python.
+//! The stages, by name or as Python objects.
 use crate::arrays;
 use crate::check::CheckPress;
 use crate::errors::{self, invalid};
@@ -22,7 +22,7 @@ use tactile_imaging::pipeline::{
     SurfaceInput,
 };
 
-/// What is pressed on the sensor. Lengths in metres.
+/// The object that is pressed on the sensor. Lengths are in metres.
 #[pyclass(frozen, module = "tactile_imaging")]
 pub(crate) struct Object(pub rust::Object);
 
@@ -46,7 +46,7 @@ impl Object {
         Self(rust::Object::Block { poisson_ratio })
     }
 
-    /// A cylinder standing on its flat face.
+    /// A cylinder on its flat face.
     #[classmethod]
     #[pyo3(signature = (*, poisson_ratio=0.5))]
     fn cylinder(_class: &Bound<'_, PyType>, poisson_ratio: f64) -> Self {
@@ -64,7 +64,7 @@ impl Object {
         })
     }
 
-    /// A cone of the half angle in radians.
+    /// A cone with the half angle in radians.
     #[classmethod]
     #[pyo3(signature = (half_angle, *, poisson_ratio=0.5))]
     fn cone(_class: &Bound<'_, PyType>, half_angle: f64, poisson_ratio: f64) -> Self {
@@ -75,7 +75,7 @@ impl Object {
         })
     }
 
-    /// A layer that is pressed by a ball.
+    /// A layer into which a ball is pressed.
     #[classmethod]
     #[pyo3(signature = (indenter_radius, thickness, *, poisson_ratio=0.5))]
     fn layer(
@@ -91,7 +91,7 @@ impl Object {
         })
     }
 
-    /// An object of unknown shape, read as one with a flat face where its contacts are such.
+    /// An object of unknown shape. It counts as flat if its contacts are those of a flat face.
     #[classmethod]
     #[pyo3(signature = (*, poisson_ratio=0.5))]
     fn unknown(_class: &Bound<'_, PyType>, poisson_ratio: f64) -> Self {
@@ -123,36 +123,37 @@ impl Object {
 
 /// The stages from a frame to Young's modulus.
 ///
-/// A stage is a name or an object with the stage's method. What an object raises, or returns in a
-/// wrong shape, is the cause of one `TactileError`.
+/// A stage is a name or an object with the method of the stage. An exception of the object, or a
+/// result of the wrong shape, gives a `TactileError` with this cause.
 ///
 /// Parameters
 /// ----------
 /// object : Object
-///     What is pressed on the sensor.
+///     The object that is pressed on the sensor.
 /// pairs : (n, 2) array
-///     Integrated pixel value and force in newtons of a calibration. Without it forces come from a
-///     gauge, `Press.add_frame(..., gauge=)`.
+///     Integrated pixel values and forces in newtons of a calibration. Without them forces come from
+///     a gauge, `Press.add_frame(..., gauge=)`.
 /// sensor : Sensor
 ///     A calibrated sensor, instead of `pairs`, `pixel_size` and `waveguide`.
 /// depth_table : (n, 2) array
-///     Grey levels below the reference and depth in metres, of a sensor that grows darker.
+///     Grey levels below the reference and depths in metres, for a sensor that darkens.
 /// contact : object
-///     Instead of these, an object with a method `measure(frame, reference)` that returns None or a
-///     dict with `radius` (m) and `force` (N) as (value, standard error), `mask` and `centre`.
+///     A user-defined contact stage instead of these: an object with a method
+///     `measure(frame, reference)` that returns None or a dict with `radius` (m) and `force` (N) as
+///     (value, standard error), `mask` and `centre`.
 /// pixel_size : float or (x, y)
-///     Metres.
+///     Size of a pixel in metres.
 /// waveguide : (k, 3) array
 ///     Thickness in metres, Young's modulus in pascals and Poisson's ratio of its layers, from the
-///     object's side. None is a rigid flat.
+///     side of the object. None is a rigid flat.
 /// control_points : int
-///     Points that are matched.
+///     Number of points that are matched.
 /// surface : str or object
 ///     "eikonal", "tsai-shah", or `reconstruct(image, mask, pixel_size)`.
 /// sampler : str or object
 ///     "contact", "equally-spaced", or `sample(heights, mask, pixel_size, count)`.
 /// matcher, matcher_options : str or object, dict
-///     As `match_points` takes them. The default search is that of near loads.
+///     As in `match_points`. The default search is for neighbouring loads.
 /// warp : str or object
 ///     "thin-plate-spline", "cubic-spline", "affine", "rigid", or `fit(sources, targets, weights)`
 ///     that returns a callable with a method `jacobian`.
@@ -161,26 +162,26 @@ impl Object {
 ///     `strain(deformation_gradient)`.
 /// estimator : str or object
 ///     "best", "paper-ratio", "regression", "sphere", "sphere-on-waveguide", "flat-punch", "cone"
-///     and others, or `estimate(loads)` that returns pascals and their standard error. Its
-///     attribute `needs_strain` says whether loads have strains. With a true attribute
-///     `counts_guide` it is `estimate(loads, layers)`, the layers as `waveguide`; without it a
-///     guide that yields is a warning of the modulus.
+///     and others, or `estimate(loads)` that returns a modulus in pascals and its standard error.
+///     Its attribute `needs_strain` determines whether loads have strains. If its attribute
+///     `counts_guide` is true, the call is `estimate(loads, layers)` with layers as in `waveguide`.
+///     Otherwise the modulus has a warning if the guide is compliant.
 /// flat_field : bool
-///     Whether frames are divided by the reference's own brightness.
+///     Whether frames are divided by the brightness of the reference.
 /// gauge_error, coupling_error, pixel_size_error, layer_error, radius_error,
 /// poisson_ratio_error, adhesion_error : float
-///     Standard errors that all loads share, by the names of scene files: four relative ones, in
-///     metres, absolute, in J/m². What is not given is assumed: 0.22 %, 12 %, 0.3 %, 5 %, 0.5 % of
-///     the radius, 0.01, 0.001 J/m².
+///     Standard errors common to all loads, named as in scene files: the first four are relative,
+///     the others in metres, absolute, and in J/m². The defaults are 0.22 %, 12 %, 0.3 %, 5 %, 0.5 %
+///     of the radius, 0.01, and 0.001 J/m².
 ///
 /// Raises
 /// ------
 /// ValueError
-///     A name that is none, or a value that is not physical.
+///     An unknown name, or an unphysical value.
 #[pyclass(frozen, module = "tactile_imaging")]
 pub(crate) struct Pipeline {
     pub pipeline: rust::Pipeline,
-    /// The stages in Python, which the collector of cycles has to see.
+    /// The stages in Python, which must be visible to the garbage collector.
     pub own: Vec<Py<PyAny>>,
 }
 
@@ -287,31 +288,31 @@ impl Pipeline {
         Ok(Self { pipeline, own })
     }
 
-    /// A press on this pipeline, with the frame without contact.
+    /// Creates a press on this pipeline, with the frame without contact.
     fn press<'py>(
         slf: &Bound<'py, Self>,
         reference: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        // By its name: a press is built on a pipeline, not the other way round.
+        // By name, because the module of presses depends on that of pipelines.
         let module = slf.py().import("tactile_imaging._native")?;
         module.getattr("Press")?.call1((slf, reference))
     }
 
-    /// A pipeline that takes presses of known force into account.
+    /// Creates a pipeline that uses presses of known force.
     ///
-    /// Presses of the sample or the calibrator give the gain of the light, by which forces are
-    /// divided. Presses of balls of known modulus give the layers of the waveguide.
+    /// Presses of the sample or the calibration object give the gain of the light, by which forces
+    /// are divided. Presses of balls of known modulus give the layers of the waveguide.
     ///
     /// Parameters
     /// ----------
     /// reference : (rows, columns) array of uint8
-    ///     The frame without contact, of all these presses.
+    ///     The frame without contact for all these presses.
     /// checks : sequence of CheckPress
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     A press that cannot be trusted, or that contradicts what is stated.
+    ///     A press that is unreliable or contradicts the stated values.
     fn with_checks(
         &self,
         py: Python<'_>,
@@ -341,8 +342,8 @@ impl Pipeline {
     }
 }
 
-/// Where force and contact come from: a sensor, or one of calibration pairs, a table of depths and
-/// an object at most.
+/// The source of force and contact: a sensor, or at most one of calibration pairs, a table of depths
+/// and an object.
 fn started(
     object: rust::Object,
     config: &StagesConfig,
@@ -396,7 +397,7 @@ fn started(
     staged.map_err(errors::pipeline)
 }
 
-/// A stage as its name, or none and the object.
+/// A stage as its name, or as an object without a name.
 fn stage(
     name: &str,
     method: &'static str,
@@ -411,14 +412,14 @@ fn stage(
     }
 }
 
-/// A choice by its name, the default without one.
+/// A choice by its name, or the default without a name.
 pub(crate) fn named<T: FromStr<Err: ToString> + Default>(name: Option<String>) -> PyResult<T> {
     name.map_or_else(|| Ok(T::default()), |name| name.parse().map_err(invalid))
 }
 
 type SharedMeasure = Box<dyn StrainMeasure + Send + Sync>;
 
-/// A measure of strain by its name, or an object with a method `strain`.
+/// A strain measure by its name, or an object with a method `strain`.
 pub(crate) fn strain_measure(name: &str, given: &Bound<'_, PyAny>) -> PyResult<SharedMeasure> {
     let (text, own) = stage(name, "strain", Some(given))?;
     if let Some(own) = own {

@@ -22,11 +22,11 @@ use tactile_imaging::pipeline::{ContactReading, ContactSurface, Flag, PairStrain
 /// Values and their standard errors.
 type ValuesAndErrors<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
-/// Frames at one or more loads. Nothing is computed before it is asked for, and all of it once.
+/// Frames at one or more loads. Every result is computed on demand and only once.
 ///
-/// Frames are counted from zero, also in sentences, from the end if negative, and `press[i]` is one
-/// with its results. Threads may share a press, and the interpreter's lock is free
-/// while it computes: a frame that another thread adds meanwhile waits.
+/// Frames are counted from zero, also in messages, and from the end if negative; `press[i]` is a
+/// frame with its results. Threads may share a press. The interpreter lock is released during
+/// computations; a frame that another thread adds meanwhile waits.
 ///
 /// Parameters
 /// ----------
@@ -35,15 +35,15 @@ type ValuesAndErrors<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>
 ///     The frame without contact.
 #[pyclass(frozen, module = "tactile_imaging")]
 pub(crate) struct Press {
-    /// A frame that comes meanwhile waits until what is computed is there.
+    /// A frame that is added during a computation waits for its end.
     press: RwLock<rust::Press<'static>>,
-    /// The stages in Python, which the collector of cycles has to see.
+    /// The stages in Python, which must be visible to the garbage collector.
     own: Vec<Py<PyAny>>,
-    /// Threads that compute. A stage in Python that asks its own press would wait for itself.
+    /// Threads that compute. A stage in Python that uses its own press would wait for itself.
     busy: Mutex<Vec<ThreadId>>,
 }
 
-/// Takes a thread off the list, whatever ended its work.
+/// Removes a thread from the list when its computation ends for any reason.
 struct Busy<'a>(&'a Mutex<Vec<ThreadId>>);
 
 impl Drop for Busy<'_> {
@@ -63,7 +63,7 @@ impl Press {
         }
     }
 
-    /// Computes without the interpreter's lock.
+    /// Computes without the interpreter lock.
     fn ask<T: Send>(
         &self,
         py: Python<'_>,
@@ -74,7 +74,7 @@ impl Press {
         })
     }
 
-    /// Works without the interpreter's lock, and not inside of the press's own work.
+    /// Runs without the interpreter lock. An error inside a computation of the same press.
     fn alone<T: Send>(
         &self,
         py: Python<'_>,
@@ -115,14 +115,14 @@ impl Press {
         Ok(Self::new_on(press.map_err(errors::pipeline)?, own))
     }
 
-    /// The press of a scene file, as the program `tactile measure` reads it.
+    /// Reads the press of a scene file, like `tactile measure`.
     ///
     /// Raises
     /// ------
     /// OSError
     ///     A file that cannot be read.
     /// ValueError
-    ///     A file that cannot be used, with the field and what is expected.
+    ///     A file that cannot be used, with the field and the expected value.
     #[classmethod]
     fn from_scene(_class: &Bound<'_, PyType>, py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let press = py.detach(|| press_of_scene(path));
@@ -135,15 +135,15 @@ impl Press {
     /// ----------
     /// frame : (rows, columns) array of uint8
     /// gauge, gauge_error : float
-    ///     Force in newtons that a gauge read, and its standard error.
+    ///     Force in newtons measured by a gauge, and its standard error.
     /// time : float
     ///     Seconds since the first frame.
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     A time that is negative or before that of an earlier frame. The press has the frame
-    ///     then, without a time.
+    ///     A time that is negative or before that of an earlier frame. The frame is then added
+    ///     without a time.
     #[pyo3(signature = (frame, *, gauge=None, gauge_error=0.0, time=None))]
     fn add_frame(
         &self,
@@ -187,7 +187,7 @@ impl Press {
         self.own.iter().try_for_each(|stage| visit.call(stage))
     }
 
-    /// A frame as it was given, (rows, columns) of uint8.
+    /// The unchanged frame, (rows, columns) of uint8.
     fn image<'py>(&self, py: Python<'py>, frame: i64) -> PyResult<Bound<'py, PyArray2<u8>>> {
         let image = self.ask(py, |press| {
             Ok(press.image(nth(press, frame)?)?.into_owned())
@@ -195,7 +195,7 @@ impl Press {
         Ok(PyArray2::from_owned_array(py, image))
     }
 
-    /// Force, radius and centroid of a frame, or None where nothing touches.
+    /// Force, radius and centroid of the contact in a frame, or None without contact.
     fn contact(&self, py: Python<'_>, frame: i64) -> PyResult<Option<Contact>> {
         let found = self.ask(py, |press| {
             let frame = nth(press, frame)?;
@@ -207,25 +207,25 @@ impl Press {
             .transpose()
     }
 
-    /// A frame with its results, counted from the end if its number is negative.
+    /// A frame with its results. A negative index counts from the end.
     fn __getitem__<'py>(slf: &Bound<'py, Self>, frame: i64) -> PyResult<Bound<'py, PyAny>> {
         let number = slf.get().ask(slf.py(), |press| nth(press, frame))?;
         of_values(slf.py(), "PressFrame", (slf, number))
     }
 
-    /// Depths to which a ball presses the guide, by the law of its layers.
+    /// Indentation of the guide by a ball, by the law of the guide's layers.
     ///
     /// Parameters
     /// ----------
     /// frame : int
     /// distances : array_like
-    ///     Distances from the contact's centre in metres.
+    ///     Distances from the centre of the contact in metres.
     ///
     /// Returns
     /// -------
     /// depth, standard_error : ndarray
-    ///     In metres. None where nothing touches, the object is no ball, or force or layers are not
-    ///     known.
+    ///     In metres. None if there is no contact, if the object is not a ball, or if force or
+    ///     layers are unknown.
     fn guide_depression<'py>(
         &self,
         py: Python<'py>,
@@ -263,7 +263,7 @@ impl Press {
         Ok(PyArray2::from_owned_array(py, points))
     }
 
-    /// The match of the first frame's control points with those of a frame.
+    /// The match of the control points of the first frame with those of a frame.
     fn matching(&self, py: Python<'_>, frame: i64) -> PyResult<Match> {
         self.ask(py, |press| {
             let frame = nth(press, frame)?;
@@ -284,26 +284,26 @@ impl Press {
     /// Raises
     /// ------
     /// TactileError
-    ///     No frame with a contact and a force, or loads that do not determine it.
+    ///     No frame with a contact and a force, or loads that do not determine the modulus.
     fn modulus(&self, py: Python<'_>) -> PyResult<Modulus> {
         Ok(modulus(&self.ask(py, |press| press.modulus())?))
     }
 
-    /// The modulus by every estimator that the frames allow.
+    /// The moduli from all estimators that can be used with the frames.
     fn estimates(&self, py: Python<'_>) -> PyResult<Vec<Modulus>> {
         let estimates = self.ask(py, |press| press.estimates())?;
         Ok(estimates.iter().map(modulus).collect())
     }
 
-    /// All results as a dictionary of plain values, those of `tactile measure --json` (whose
-    /// `cautions` are `flags` here). A result that is not there has its reason.
+    /// All results as a dictionary of plain values, equal to `tactile measure --json` (its
+    /// `cautions` are `flags` here). A missing result has its reason.
     fn measure<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let text = self.ask(py, |press| Ok(serde_json::to_string(&press.measure())))?;
         let text = text.map_err(errors::invalid)?;
         py.import("json")?.call_method1("loads", (text,))
     }
 
-    /// All results as text, with what could not be computed and why.
+    /// All results as text, with the reasons of missing ones.
     fn summary(&self, py: Python<'_>) -> PyResult<String> {
         self.ask(py, |press| Ok(press.measure().to_string()))
     }
@@ -313,7 +313,7 @@ impl Press {
     /// Parameters
     /// ----------
     /// frame : int
-    ///     Its number, from the end where it is negative.
+    ///     Index of the frame, counted from the end if negative.
     ///
     /// Returns
     /// -------
@@ -334,7 +334,7 @@ impl Press {
     }
 }
 
-/// The frame of a number that counts from the end if it is negative.
+/// The frame of an index. A negative index counts from the end.
 fn nth(press: &rust::Press<'static>, number: i64) -> Result<usize, PipelineError> {
     let frames = press.frames();
     let from = if number < 0 { frames as i64 } else { 0 };
@@ -430,17 +430,17 @@ pub(crate) fn modulus(estimate: &ModulusEstimate) -> Modulus {
 
 /// A stream of frames from one sensor and one object, with constant memory.
 ///
-/// A session belongs to one thread at a time. Different sessions run side by side.
+/// A session belongs to one thread at a time. Different sessions can run in parallel.
 ///
 /// Parameters
 /// ----------
 /// pipeline : Pipeline
 /// references : sequence of (rows, columns) arrays of uint8
-///     One frame or more without contact.
+///     One or more frames without contact.
 #[pyclass(module = "tactile_imaging")]
 pub(crate) struct Session {
     session: rust::pipeline::Session,
-    /// The stages in Python, which the collector of cycles has to see.
+    /// The stages in Python, which must be visible to the garbage collector.
     own: Vec<Py<PyAny>>,
 }
 
@@ -465,7 +465,7 @@ impl Session {
         Ok(Self { session, own })
     }
 
-    /// Measures the next frame: its contact, or None where nothing touches.
+    /// Measures the next frame: its contact, or None without contact.
     fn push(&mut self, py: Python<'_>, frame: &Bound<'_, PyAny>) -> PyResult<Option<Contact>> {
         let frame = arrays::frame("frame", frame)?;
         let (session, view) = (&mut self.session, frame.as_array());
@@ -485,7 +485,7 @@ impl Session {
         self.own.iter().try_for_each(|stage| visit.call(stage))
     }
 
-    /// Mean strain since the load at which it was asked for first, None there.
+    /// Mean strain since the load of the first call, for which it is None.
     fn strain(&mut self, py: Python<'_>) -> PyResult<Option<Strain>> {
         let session = &mut self.session;
         let strain = py.detach(|| Ok(session.strain()?.map(|followed| followed.strain.clone())));

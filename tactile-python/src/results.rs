@@ -1,4 +1,4 @@
-//! Frozen results: fields, a sentence, a table for notebooks, a dictionary.
+//! Frozen results with fields, a sentence, a table for notebooks, and a dictionary.
 use crate::arrays::{self, Matrix, Tensors, Vector};
 use crate::errors::{failed, invalid};
 use nalgebra::{Point, SMatrix, SVector};
@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use tactile_imaging::core::{Estimate as CoreEstimate, Interval};
 use tactile_imaging::tps::{LocalField, TpsError};
 
-/// What a result is as a value: written in Python, as it is made of Python's values.
+/// Functions of results as values, written in Python because they consist of Python values.
 pub(crate) fn of_values<'py>(
     py: Python<'py>,
     function: &str,
@@ -21,8 +21,8 @@ pub(crate) fn of_values<'py>(
         .call_method1(function, arguments)
 }
 
-/// A table of two columns. Values are escaped: they may hold text of the caller. Of arrays larger
-/// than a tensor the shape is shown.
+/// A table with two columns. Values are escaped, because they may contain text of the caller. For
+/// arrays larger than a tensor, the shape is shown.
 pub(crate) fn to_html(result: &Bound<'_, PyAny>, names: &[&str]) -> PyResult<String> {
     let escaped = |text: String| text.replace('&', "&amp;").replace('<', "&lt;");
     let mut html = String::from("<table>");
@@ -40,7 +40,7 @@ pub(crate) fn to_html(result: &Bound<'_, PyAny>, names: &[&str]) -> PyResult<Str
     Ok(html + "</table>")
 }
 
-/// A frozen class of fields with what every result has.
+/// A frozen class with fields and the methods of every result.
 macro_rules! result {
     (
         $(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $field:ident: $kind:ty,)+
@@ -66,7 +66,7 @@ macro_rules! result {
                 to_html(slf.as_any(), &[$(stringify!($field)),+])
             }
 
-            /// Names of what is worked out of the fields when it is asked for.
+            /// Names of the attributes that are computed from the fields on demand.
             #[classattr]
             fn _computed() -> Vec<&'static str> {
                 vec![$($(stringify!($computed)),*)?]
@@ -93,13 +93,13 @@ macro_rules! result {
                 })
             }
 
-            /// The fields by name. Plain ones are numbers, text and lists alone.
+            /// The fields by name. With `plain` they contain only numbers, text and lists.
             #[pyo3(signature = (*, plain=false))]
             fn to_dict<'py>(slf: &Bound<'py, Self>, plain: bool) -> PyResult<Bound<'py, PyAny>> {
                 of_values(slf.py(), "to_dict", (slf, plain))
             }
 
-            /// The result of these fields by name, as `to_dict` gives them.
+            /// Creates a result from fields by name, as returned by `to_dict`.
             #[classmethod]
             fn from_dict<'py>(
                 class: &Bound<'py, PyType>,
@@ -108,7 +108,7 @@ macro_rules! result {
                 of_values(class.py(), "from_dict", (class, fields))
             }
 
-            /// A table of the fields that have a row for each point, or of one row.
+            /// A table of the fields with one row per point, or of a single row.
             fn to_dataframe<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
                 of_values(slf.py(), "to_dataframe", (slf,))
             }
@@ -140,11 +140,11 @@ macro_rules! result {
 result! {
     /// A number with its standard error.
     Estimate {
-        /// The number.
+        /// Value.
         value: f64,
-        /// Its standard error.
+        /// Standard error of the value.
         standard_error: f64,
-        /// Its 95 % interval. No upper end where the data do not bound it.
+        /// 95 % interval. The upper end is None if the data do not bound it.
         interval_95: (f64, Option<f64>),
     }
 }
@@ -154,19 +154,19 @@ result! {
     Modulus {
         /// Young's modulus.
         value: f64,
-        /// Its standard error.
+        /// Standard error of the value.
         standard_error: f64,
-        /// Its 95 % interval. No upper end where the loads do not bound it.
+        /// 95 % interval. The upper end is None if the loads do not bound it.
         interval_95: (f64, Option<f64>),
         /// The name of the estimator.
         estimator: String,
-        /// Where the estimator's assumptions fail, a sentence each.
+        /// Violated assumptions of the estimator, one sentence each.
         flags: Vec<String>,
     }
 }
 
 result! {
-    /// One load of a series, as an estimator gets it.
+    /// One load of a series, as passed to an estimator.
     Load {
         /// Normal force in newtons.
         force: Py<Estimate>,
@@ -176,7 +176,7 @@ result! {
         area: Option<Py<Estimate>>,
         /// Indentation in metres.
         indentation: Option<Py<Estimate>>,
-        /// Mean strain along the load, of specimens whose strain is worked out.
+        /// Mean strain along the load, for specimens whose strain is computed.
         strain: Option<Py<Estimate>>,
     }
 }
@@ -184,11 +184,11 @@ result! {
 result! {
     /// The contact of one frame.
     Contact {
-        /// Normal force in newtons, where the sensor is calibrated.
+        /// Normal force in newtons, if the sensor is calibrated.
         force: Option<Py<Estimate>>,
         /// Contact radius in metres.
         radius: Py<Estimate>,
-        /// Indentation in metres, of a sensor that reads depth.
+        /// Indentation in metres, for a sensor that measures depth.
         indentation: Option<Py<Estimate>>,
         /// Centroid x in pixels.
         x: Py<Estimate>,
@@ -196,15 +196,15 @@ result! {
         y: Py<Estimate>,
         /// Area in square metres.
         area: f64,
-        /// Whether the frame's edge cuts the contact.
+        /// Whether the contact is cut by the edge of the frame.
         touches_edge: bool,
-        /// What is doubtful about it, a sentence each.
+        /// Doubts about the result, one sentence each.
         flags: Vec<String>,
     }
 }
 
 result! {
-    /// A place where something touches a gel.
+    /// A contact on a gel.
     GelContact {
         /// Centroid x in pixels.
         x: Py<Estimate>,
@@ -212,31 +212,31 @@ result! {
         y: Py<Estimate>,
         /// Area in square metres.
         area: Py<Estimate>,
-        /// Greatest depth in metres below the contact's own rim.
+        /// Largest depth in metres below the rim of the contact.
         depth: Py<Estimate>,
-        /// Greatest depth in metres below the gel far away.
+        /// Largest depth in metres below the gel far from contacts.
         depth_below_far: Py<Estimate>,
-        /// Normal force in newtons, of sensors with a layer.
+        /// Normal force in newtons, for sensors with a layer.
         force: Option<Py<Estimate>>,
         /// Columns and rows of the outline in order, (n, 2).
         outline: Matrix<i64>,
-        /// Whether the frame's edge cuts the contact.
+        /// Whether the contact is cut by the edge of the frame.
         touches_edge: bool,
     }
 }
 
 result! {
-    /// How the presses of a gel's calibration were read.
+    /// Report of the calibration of a gel.
     GelReport {
-        /// x, y and radius of the contacts in pixels, (n, 3), NaN of presses that were left out.
+        /// x, y and radius of the contacts in pixels, (n, 3). NaN for presses that were left out.
         circles: Matrix<f64>,
-        /// Median angle in degrees of normals of presses left out in turn.
+        /// Median angular error in degrees of the normals, with each press left out once.
         median_angle: f64,
-        /// Relative standard error of all slopes of a frame together.
+        /// Relative standard error common to all slopes of a frame.
         slope_error: f64,
         /// Standard error of the depth of a pixel in metres.
         depth_error: f64,
-        /// Why the sensor may be wrong, a sentence each.
+        /// Doubts about the sensor, one sentence each.
         flags: Vec<String>,
     }
 }
@@ -244,13 +244,13 @@ result! {
 result! {
     /// Markers of a gel, followed from a reference to a frame.
     Markers {
-        /// Places in the reference in pixels, (n, 2).
+        /// Positions in the reference in pixels, (n, 2).
         positions: Matrix<f64>,
         /// Displacements in pixels, (n, 2).
         displacements: Matrix<f64>,
-        /// Standard errors of a coordinate of the place and of the displacement, (n, 2).
+        /// Standard errors of a coordinate of the position and of the displacement, (n, 2).
         standard_errors: Matrix<f64>,
-        /// Why the pairs may be wrong, a sentence each.
+        /// Doubts about the pairs, one sentence each.
         flags: Vec<String>,
     }
 }
@@ -262,11 +262,11 @@ result! {
         contact_radius: f64,
         /// Metres.
         indentation: f64,
-        /// Pascals, in the middle.
+        /// Peak pressure in pascals.
         peak_pressure: f64,
-        /// Pascals.
+        /// Mean pressure in pascals.
         mean_pressure: f64,
-        /// Newtons a metre.
+        /// Stiffness in newtons per metre.
         stiffness: f64,
         /// E* of both bodies in pascals.
         reduced_modulus: f64,
@@ -278,20 +278,20 @@ result! {
     Surface {
         /// Heights in metres, NaN outside the contact.
         heights: Matrix<f64>,
-        /// Size of a pixel of the heights in metres, x and y.
+        /// Pixel size of the heights in metres, x and y.
         pixel_size: (f64, f64),
-        /// Place of the first height in metres, x and y.
+        /// Position of the first height in metres, x and y.
         origin: (f64, f64),
     }
 
-    /// Places of the columns along x in metres.
+    /// Positions of the columns along x in metres.
     #[getter]
     fn x<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let place = |k| self.origin.0 + self.pixel_size.0 * k as f64;
         PyArray1::from_iter(py, (0..self.heights.bind(py).shape()[1]).map(place))
     }
 
-    /// Places of the rows along y in metres.
+    /// Positions of the rows along y in metres.
     #[getter]
     fn y<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let place = |k| self.origin.1 + self.pixel_size.1 * k as f64;
@@ -318,8 +318,8 @@ result! {
 result! {
     /// Mean strain between two frames.
     ///
-    /// There is no interval: what a point is off is off at its neighbours too, and by how much is
-    /// not known.
+    /// There is no interval, because the errors of neighbouring points are correlated to an unknown
+    /// degree.
     Strain {
         /// Mean tensor over the control points, 3 × 3.
         value: Matrix<f64>,
@@ -327,11 +327,11 @@ result! {
         standard_error: Matrix<f64>,
         /// Standard deviation over the control points, 3 × 3.
         spread: Matrix<f64>,
-        /// The name of the measure of strain.
+        /// Name of the strain measure.
         measure: String,
-        /// Control points that count.
+        /// Number of control points used.
         used: usize,
-        /// What is doubtful about it, a sentence each.
+        /// Doubts about the result, one sentence each.
         flags: Vec<String>,
     }
 }
@@ -357,31 +357,31 @@ result! {
         standard_errors: Tensors,
         /// Displacement gradient at every matched point, (n, 3, 3).
         displacement_gradients: Tensors,
-        /// Its standard error, (n, 3, 3).
+        /// Standard error of the gradient, (n, 3, 3).
         displacement_gradient_errors: Tensors,
         /// Angle of the rotation at every matched point in radians, in the plane counter-clockwise,
         /// and its standard error, (n, 2).
         rotations_rad: Matrix<f64>,
         /// Principal strains at every matched point, the largest first, (n, 3).
         principal_strains: Matrix<f64>,
-        /// Their standard errors, (n, 3).
+        /// Standard errors of the principal strains, (n, 3).
         principal_strain_errors: Matrix<f64>,
-        /// Their directions, up to sign: row k of a point is direction k, (n, 3, 3).
+        /// Principal directions, up to their sign, (n, 3, 3). Row k of a point is direction k.
         principal_directions: Tensors,
-        /// Volume, in the plane area, over that before, and its standard error, (n, 2).
+        /// Ratio of volumes (of areas in the plane), after to before, and its standard error, (n, 2).
         size_ratios: Matrix<f64>,
         /// Von Mises' equivalent strain and its standard error, (n, 2).
         von_mises: Matrix<f64>,
         /// Noise of one coordinate in the unit of the points.
         sigma: f64,
-        /// Why the pairs are not to be relied on, a sentence each.
+        /// Reasons why the pairs are unreliable, one sentence each.
         flags: Vec<String>,
-        /// Displacement and strain on a grid, where one was asked for.
+        /// Displacement and strain on the grid, if one was requested.
         grid: Option<Py<StrainGrid>>,
     }
 
-    /// Writes displacement and strain of the grid, or of the matched points where there is none, in
-    /// the legacy format of VTK (ParaView).
+    /// Writes displacement and strain in the legacy format of VTK (ParaView): of the grid, or of the
+    /// matched points without a grid.
     ///
     /// Parameters
     /// ----------
@@ -413,59 +413,59 @@ result! {
 }
 
 result! {
-    /// Displacement and strain at places.
+    /// Displacement and strain at given points.
     StrainGrid {
-        /// The places, (k, d), the first axis fastest.
+        /// Positions, (k, d), with the first axis fastest.
         points: Matrix<f64>,
-        /// Number of places along each axis of a grid. Nothing of places that were given.
+        /// Number of points along each axis of a grid. Empty for given positions.
         counts: Vec<usize>,
         /// Displacements, (k, d).
         displacements: Matrix<f64>,
-        /// Strains, (k, 3, 3), NaN where the deformation folds.
+        /// Strains, (k, 3, 3). NaN if the deformation folds.
         strains: Tensors,
-        /// Their standard errors, (k, 3, 3).
+        /// Standard errors of the strains, (k, 3, 3).
         standard_errors: Tensors,
     }
 }
 
-/// Places, (k, d), and the standard error of a coordinate of each.
+/// Positions, (k, d), and the standard error of a coordinate of each.
 type PlacesAndErrors<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>);
 
 result! {
-    /// Which model point is which target point.
+    /// Pairs of model and target points.
     Match {
         /// Target row of every model point, −1 for none, (n,).
         assignment: Vector<i64>,
-        /// Probability that each of these is right, (n,).
+        /// Probability that each row is correct, (n,).
         confidence: Vector<f64>,
         /// Rows of model and target of every pair, (k, 2).
         pairs: Matrix<i64>,
         /// Noise of one coordinate in the unit of the points.
         sigma: f64,
-        /// Iterations.
+        /// Number of iterations.
         iterations: usize,
-        /// Of a matcher with a `transformation`: the rotation vector in radians, in the plane its
-        /// last number, and the standard errors.
+        /// For a matcher with a `transformation`: the rotation vector in radians (in the plane its last
+        /// component), and the standard errors.
         rotation: Option<Vec<f64>>,
         rotation_error: Option<Vec<f64>>,
-        /// The growth of lengths, and its standard error.
+        /// Scale factor of lengths, and its standard error.
         scale: Option<f64>,
         scale_error: Option<f64>,
-        /// Where the origin goes, and the standard errors.
+        /// Image of the origin, and the standard errors.
         translation: Option<Vec<f64>>,
         translation_error: Option<Vec<f64>>,
-        /// The map of homogeneous coordinates, (d + 1, d + 1).
+        /// Matrix of homogeneous coordinates, (d + 1, d + 1).
         matrix: Option<Matrix<f64>>,
-        /// Why the pairs are not to be relied on, where the matcher can tell, a sentence each.
+        /// Reasons why the pairs are unreliable, if the matcher reports them, one sentence each.
         flags: Vec<String>,
-        /// The points that were matched, (n, d).
+        /// Model points, (n, d).
         model: Matrix<f64>,
-        /// And those that they were matched to, (m, d).
+        /// Target points, (m, d).
         target: Matrix<f64>,
         ; [warped, residual] warped_once: PyOnceLock<Matrix<f64>>
     }
 
-    /// Where `transform` takes the model points, (n, d).
+    /// Images of the model points by `transform`, (n, d).
     #[getter]
     fn warped(&self, py: Python<'_>) -> PyResult<Matrix<f64>> {
         let moved = || {
@@ -494,7 +494,8 @@ result! {
         Ok((squares.sum::<f64>() / pairs.nrows().max(1) as f64).sqrt())
     }
 
-    /// Draws the points of the plane (of space as seen along z), with a line from each to its target.
+    /// Draws the points in the plane (points in space are seen along z), with a line from each to its
+    /// target.
     ///
     /// Returns
     /// -------
@@ -509,7 +510,7 @@ result! {
         plots.call_method1("plot_match", (slf,))
     }
 
-    /// Where points go: by the map of a `transformation`, else by the local field of the pairs.
+    /// Maps points by the matrix of a `transformation`, or by the local field of the pairs.
     ///
     /// Parameters
     /// ----------
@@ -518,12 +519,12 @@ result! {
     /// Returns
     /// -------
     /// points, standard_errors : ndarray
-    ///     (k, d), and (k,) of a coordinate.
+    ///     Mapped points, (k, d), and the standard error of a coordinate of each, (k,).
     ///
     /// Raises
     /// ------
     /// TactileError
-    ///     No pairs.
+    ///     There are no pairs.
     fn transform<'py>(
         &self,
         py: Python<'py>,
@@ -571,29 +572,29 @@ impl Match {
 result! {
     /// A lump under the surface of a block.
     Lump {
-        /// Its middle along x from the axis of the guide, or of a scan in the coordinates of its
-        /// presses, in metres. None where it was searched under the axis.
+        /// x of the centre in metres, from the axis of the guide, or in the coordinates of the presses of
+        /// a scan. None if the lump was searched only under the axis.
         x: Option<Py<Estimate>>,
-        /// The same along y.
+        /// y of the centre, like `x`.
         y: Option<Py<Estimate>>,
-        /// Diameter of the ball of its volume in metres.
+        /// Diameter in metres of a ball of equal volume.
         diameter: Py<Estimate>,
-        /// Depth of its top in metres.
+        /// Depth of the top of the lump in metres.
         depth: Py<Estimate>,
-        /// Its Young's modulus in pascals.
+        /// Young's modulus of the lump in pascals.
         youngs_modulus: Py<Estimate>,
-        /// Its height along the axis over its width.
+        /// Ratio of height along the axis to width.
         height_over_width: Option<Py<Estimate>>,
-        /// Probability that it is a ball.
+        /// Probability that the lump is a ball.
         ball_probability: f64,
-        /// Names of those of diameter, depth and modulus that the frames determine. Of the others
-        /// the interval alone is of use.
+        /// The names of diameter, depth and modulus that are determined by the frames. Only the interval
+        /// of the others is meaningful.
         identified: Vec<String>,
     }
 }
 
 result! {
-    /// What a search for a lump in a block found.
+    /// Result of the search for a lump in a block.
     Inclusion {
         /// "found", "absent" or "uncertain".
         verdict: String,
@@ -601,24 +602,24 @@ result! {
         probability: f64,
         /// Young's modulus of the block in pascals.
         block_modulus: Py<Estimate>,
-        /// The lump, or two of them. None where the frames show none, or it is not explained.
+        /// One lump or two. Empty if the frames show none or cannot be explained.
         lumps: Vec<Py<Lump>>,
-        /// "bonded" or "frictionless", whether the guide's face sticks to the block or slides on
+        /// "bonded" or "frictionless": whether the face of the guide sticks to the block or slides on
         /// it.
         interface: String,
-        /// What is doubtful about it, a sentence each.
+        /// Doubts about the result, one sentence each.
         flags: Vec<String>,
     }
 }
 
 result! {
-    /// A simulated press with its truth.
+    /// A simulated press with the true values.
     SimulatedPress {
         /// The frame without contact, uint8.
         reference: Matrix<u8>,
-        /// One frame for each load, uint8.
+        /// One frame per load, uint8.
         frames: Vec<Matrix<u8>>,
-        /// Calibration of the sensor: integrated pixel value and newtons, (n, 2).
+        /// Calibration of the sensor: integrated pixel values and forces in newtons, (n, 2).
         pairs: Matrix<f64>,
         /// Size of a pixel in metres, x and y.
         pixel_size: (f64, f64),
@@ -629,14 +630,14 @@ result! {
         radius: f64,
         /// Poisson's ratio of the ball.
         poisson_ratio: f64,
-        /// The estimator that knows the simulated contacts.
+        /// The estimator that corresponds to the simulated contacts.
         estimator: String,
         /// The true Young's modulus, forces, contact radii and centres.
         truth: Py<PyDict>,
     }
 }
 
-/// Where points go and the standard error of a coordinate, from sources, their images and the points.
+/// Images of points and the standard error of a coordinate, from sources, their images and the points.
 fn moved<const D: usize>(
     [sources, images, points]: [ArrayView2<'_, f64>; 3],
     matrix: Option<ArrayView2<'_, f64>>,
@@ -662,8 +663,8 @@ fn moved<const D: usize>(
         .iter()
         .map(|p| Point::from(linear * p.coords + shift))
         .collect();
-    // The error of the mean, and that of the map's other numbers, which grows with the distance from
-    // it: each of D directions has its share of the spread.
+    // The error of the mean, and that of the other parameters of the map, which increases with the
+    // distance from the mean: each of D directions has an equal part of the spread.
     let count = sources.len().max(1) as f64;
     let centre = sources.iter().map(|p| p.coords).sum::<SVector<f64, D>>() / count;
     let spread: f64 = sources

@@ -1,4 +1,4 @@
-//! Sensors: calibrated once, kept in a file.
+//! Sensors: calibrated once and stored in a file.
 use crate::arrays;
 use crate::errors::{self, invalid};
 use pyo3::prelude::*;
@@ -20,40 +20,40 @@ impl Sensor {
     /// Raises
     /// ------
     /// OSError, ValueError
-    ///     A file that cannot be read, or not be used: the field and what is expected.
+    ///     A file that cannot be read or used, with the field and the expected value.
     #[classmethod]
     fn load(_class: &Bound<'_, PyType>, path: PathBuf) -> PyResult<Self> {
         rust::Sensor::read(path).map(Self).map_err(errors::file)
     }
 
-    /// Writes the sensor file, TOML.
+    /// Writes the sensor file (TOML).
     fn save(&self, path: PathBuf) -> PyResult<()> {
         self.0.write(path).map_err(errors::file)
     }
 
-    /// Calibrates by the presses that a calibration file names, as `tactile calibrate` does.
+    /// Calibrates with the presses listed in a calibration file, like `tactile calibrate`.
     #[classmethod]
     fn calibrate(_class: &Bound<'_, PyType>, py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         Self::fitted(py, || SensorCalibration::read(path).map_err(Into::into))
     }
 
-    /// Calibrates by presses of balls under known forces.
+    /// Calibrates with presses of balls under known forces.
     ///
     /// Parameters
     /// ----------
     /// references, frames : sequences of (rows, columns) arrays of uint8
-    ///     Frames without contact, and one for each press.
+    ///     Frames without contact, and one frame per press.
     /// forces : (n,) array
-    ///     Newtons that the gauge read.
+    ///     Gauge readings in newtons.
     /// radii : (n,) array
-    ///     Radius in metres of each press's ball.
+    ///     Radius of the ball of each press in metres.
     /// pixel_size : float or (x, y)
-    ///     Metres.
+    ///     Size of a pixel in metres.
     /// layers : (k, 7) array
     ///     Refractive index, thickness and its error in metres, Young's modulus and its error in
-    ///     pascals, Poisson's ratio and its error, from the object's side. None is a rigid flat.
+    ///     pascals, Poisson's ratio and its error, from the side of the object. None is a rigid flat.
     /// unloading : sequence of bool
-    ///     Which presses were made while the force fell.
+    ///     Whether each press was made during unloading.
     /// pixel_size_error, gauge_error : float
     ///     Relative standard errors.
     /// gauge_noise : float
@@ -129,7 +129,7 @@ impl Sensor {
         Self::fitted(py, || Ok(calibration))
     }
 
-    /// Pressure in pascals of brightenings in grey levels, (n,).
+    /// Pressures in pascals for increases of brightness in grey levels, (n,).
     fn pressure<'py>(
         &self,
         py: Python<'py>,
@@ -143,7 +143,7 @@ impl Sensor {
         Ok(numpy::PyArray1::from_iter(py, pressures))
     }
 
-    /// When it was calibrated, as it was written.
+    /// Date of the calibration, as stated.
     #[getter]
     fn date(&self) -> &str {
         &self.0.date

@@ -1,4 +1,4 @@
-//! Simulated presses to try the pipeline on.
+//! Simulated presses for trying the pipeline.
 use crate::arrays;
 use crate::errors::invalid;
 use crate::results::SimulatedPress;
@@ -12,18 +12,17 @@ use tactile_simulate::{CalibrationRun, Camera, ContactModel, PressLoad, PressOpt
 /// Parameters
 /// ----------
 /// forces : sequence of float
-///     Newtons, a frame each.
+///     Forces in newtons, one per frame.
 /// radius : float
-///     Of the ball in metres.
+///     Radius of the ball in metres.
 /// youngs_modulus, poisson_ratio : float
-///     Of the ball. Pascals.
+///     Modulus of the ball in pascals, and its Poisson's ratio.
 /// physics : str
-///     "finite-elements", which are there for balls of 3 mm and of 103 or 62 kPa up to 1.3 N, or
-///     "hertz".
+///     "finite-elements", which exist for balls of 3 mm with 103 or 62 kPa up to 1.3 N, or "hertz".
 /// coarser : int
 ///     Factor by which pixels are larger than those of 1392 × 1042 on 30 mm.
 /// seed : int
-///     Of the camera's noise.
+///     Seed of the camera noise.
 ///
 /// Returns
 /// -------
@@ -46,7 +45,7 @@ pub(crate) fn simulate(
     let forces = forces.unwrap_or_else(|| vec![0.7, 1.2]);
     let (law, estimator) = match physics {
         "finite-elements" => (ContactModel::FiniteElements, "best"),
-        // Read by the same law.
+        // Evaluated by the same law.
         "hertz" => (ContactModel::Hertz, "sphere"),
         other => {
             return Err(invalid(format!(

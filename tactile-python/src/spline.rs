@@ -8,8 +8,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tactile_imaging::tps::{FitOptions, Kernel, NegR, Progress, R2LogR, R3, Smoothing, Spline};
 
-/// A spline of any kernel in the plane or in space, of which the caller's outputs are the first and
-/// the others zero.
+/// A spline of any kernel in the plane or in space. The first outputs are those of the caller, and
+/// the others are zero.
 trait Fitted: Send + Sync {
     /// (points, outputs).
     fn values(&self, points: ArrayView2<'_, f64>, outputs: usize) -> Array2<f64>;
@@ -20,9 +20,9 @@ trait Fitted: Send + Sync {
     fn spanned(&self) -> usize;
 }
 
-/// Outputs of one fit.
+/// Number of outputs of one fit.
 const LANES: usize = 4;
-/// Points that are evaluated between two looks for signals: 60 ms with 3,000 sources.
+/// Number of points evaluated between two checks for signals: 60 ms with 3,000 sources.
 const AT_ONCE: usize = 4096;
 
 impl<const D: usize, const M: usize, K: Kernel + Send + Sync> Fitted for Spline<D, M, K> {
@@ -60,36 +60,36 @@ impl<const D: usize, const M: usize, K: Kernel + Send + Sync> Fitted for Spline<
 /// targets : (n, ...) array
 ///     Real or complex values of any shape at each point.
 /// smoothing : float or "gcv"
-///     λ ≥ 0 of Σ|f(x_i) − y_i|² + λ wᵀKw, or that of generalised cross-validation. None is 0.
+///     λ ≥ 0 in Σ|f(x_i) − y_i|² + λ wᵀKw, or generalised cross-validation. None is 0.
 /// kernel : str
-///     "thin_plate_spline" (r² ln r), "linear" (−r) or "cubic" (r³), as SciPy's `RBFInterpolator`
-///     with `degree=1`.
+///     "thin_plate_spline" (r² ln r), "linear" (−r) or "cubic" (r³), as in SciPy's
+///     `RBFInterpolator` with `degree=1`.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     Lengths that differ, numbers that are not finite, points that determine no spline.
+///     Different lengths, numbers that are not finite, or points that do not determine a spline.
 ///
 /// Notes
 /// -----
-/// A fit of n points takes O(n³) time and O(n²) memory, once for each four numbers of a target.
+/// A fit of n points needs O(n³) time and O(n²) memory, for every four numbers of a target.
 ///
-/// Where the sources lie on a line or in a plane, directions across them are undetermined: with as
-/// many outputs as axes the spline is a map of space and keeps the identity there, else its slope
-/// there is zero. `flags` says so.
+/// If the sources lie on a line or in a plane, the directions across it are undetermined. A spline
+/// with as many outputs as axes is a map of space and keeps the identity in these directions.
+/// Otherwise its slope there is zero. `flags` contains a sentence in this case.
 #[pyclass(frozen, module = "tactile_imaging")]
 pub(crate) struct ThinPlateSpline {
-    /// Of up to four outputs each.
+    /// Splines with up to four outputs each.
     fitted: Vec<Box<dyn Fitted>>,
     axes: usize,
-    /// Real numbers of a target.
+    /// Number of real numbers of a target.
     outputs: usize,
     /// The shape of a target.
     shape: Vec<usize>,
     complex: bool,
     /// Number of sources.
     points: usize,
-    /// What it was made of.
+    /// The arguments of the constructor.
     arguments: [Py<PyAny>; 2],
     keywords: Py<PyDict>,
 }
@@ -153,7 +153,7 @@ impl ThinPlateSpline {
         };
         let is_map = outputs == axes;
         let fit = |columns: ArrayView2<'_, f64>, signals: &mut Signals| match (kernel, axes) {
-            // Points of a line are those of a plane with one axis of no extent.
+            // Points on a line are treated as points in a plane with one axis of zero extent.
             ("thin_plate_spline", 1 | 2) => {
                 fit::<2, _>([view, columns], is_map, R2LogR, smoothing, signals)
             }
@@ -186,7 +186,7 @@ impl ThinPlateSpline {
         })
     }
 
-    /// Values at points of shape (..., d), each of the shape of a target.
+    /// Values at points of shape (..., d), each with the shape of a target.
     fn __call__<'py>(
         &self,
         py: Python<'py>,
@@ -218,7 +218,7 @@ impl ThinPlateSpline {
         values.call_method1("reshape", (shape,))
     }
 
-    /// Jacobians at points of shape (..., d): (..., m, d) for m real numbers of a target, ∂f_i/∂x_j.
+    /// Jacobians ∂f_i/∂x_j at points of shape (..., d): (..., m, d) for m real numbers of a target.
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
@@ -240,7 +240,7 @@ impl ThinPlateSpline {
         jacobians.call_method1("reshape", (shape,))
     }
 
-    /// The smoothing λ that was used, of more than four outputs the largest.
+    /// The smoothing λ that was used. With more than four outputs, the largest.
     #[getter]
     fn smoothing(&self) -> f64 {
         self.fitted
@@ -249,7 +249,7 @@ impl ThinPlateSpline {
             .fold(0.0, f64::max)
     }
 
-    /// What is not determined, a sentence each.
+    /// Undetermined directions, one sentence each.
     #[getter]
     fn flags(&self) -> Vec<String> {
         let (axes, spanned) = (
@@ -260,7 +260,7 @@ impl ThinPlateSpline {
         (spanned < axes).then(sentence).into_iter().collect()
     }
 
-    /// It is fitted anew from what it was made of.
+    /// A pickled spline is fitted anew from the arguments of the constructor.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let (py, made) = (slf.py(), slf.get());
         let anew = py.import("copyreg")?.getattr("__newobj_ex__")?;
@@ -289,7 +289,7 @@ impl ThinPlateSpline {
 }
 
 impl ThinPlateSpline {
-    /// Points, and the shape of the array of them.
+    /// Points, and the shape of their array.
     fn queries<'py>(
         &self,
         points: &Bound<'py, PyAny>,
@@ -315,14 +315,14 @@ impl ThinPlateSpline {
     }
 }
 
-/// Points, zero along axes that they lack.
+/// Points, with zero along missing axes.
 fn filled_up<const D: usize>(points: ArrayView2<'_, f64>) -> Vec<Point<f64, D>> {
     let at = |row: usize, axis: usize| points.get([row, axis]).copied().unwrap_or(0.0);
     let point = |row| Point::from(std::array::from_fn::<f64, D, _>(|axis| at(row, axis)));
     (0..points.nrows()).map(point).collect()
 }
 
-/// A map of space where there are as many outputs as axes, else a function.
+/// A map of space if there are as many outputs as axes, otherwise a function.
 fn fit<const D: usize, K: Kernel + Send + Sync + 'static>(
     sets: [ArrayView2<'_, f64>; 2],
     is_map: bool,
@@ -333,7 +333,7 @@ fn fit<const D: usize, K: Kernel + Send + Sync + 'static>(
     if is_map && sets[0].ncols() == D {
         fit_to::<D, D, K>(sets, kernel, smoothing, signals)
     } else {
-        // More outputs than axes, so that the spline is no map.
+        // More outputs than axes, so that the spline is not a map.
         fit_to::<D, LANES, K>(sets, kernel, smoothing, signals)
     }
 }

@@ -1,4 +1,4 @@
-//! Heights: from one image, from slopes, from darkness.
+//! Heights from one image, from slopes, or from darkening.
 use crate::arrays;
 use crate::errors::{self, Signals, invalid};
 use crate::pipeline::named;
@@ -15,31 +15,31 @@ use tactile_imaging::sfs::{
     SfsError, SlopeIntegrator, Surface, SurfaceReconstruction, SurfaceWorkspace, TsaiShah,
 };
 
-/// Heights of a surface from one shaded image.
+/// Computes the heights of a surface from one shaded image.
 ///
-/// Grey levels are modelled as ambient + intensity max(0, n·s) with the surface's normal n and the
+/// Grey levels are modelled as ambient + intensity max(0, n·s) with the surface normal n and the
 /// direction s to the light.
 ///
 /// Parameters
 /// ----------
 /// image : (rows, columns) array
 /// light : (x, y, z)
-///     Direction to the light: x right, y down the image, z to the viewer. From the viewer where
-///     it is None.
+///     Direction to the light: x right, y down the image, z to the viewer. If it is None, the light
+///     comes from the viewer.
 /// method : str
 ///     "eikonal" or "tsai-shah". By default "eikonal" under frontal light with a mask, else
 ///     "tsai-shah".
 /// mask : (rows, columns) array of bool
-///     True where there are heights. At its border they are zero ("eikonal").
+///     True at pixels with a height. At its border heights are zero ("eikonal").
 /// pixel_size : float or (x, y)
-///     Heights have its unit.
+///     Size of a pixel. Heights have its unit.
 /// intensity, ambient : float
-///     Grey level of a surface that faces the light above the ambient, and without light.
+///     Grey level above the ambient of a surface that faces the light, and the ambient.
 ///
 /// Returns
 /// -------
 /// (rows, columns) array
-///     NaN where there is no height.
+///     NaN at pixels without a height.
 #[pyfunction]
 #[pyo3(signature = (
     image, *, light=None, method=None, mask=None, pixel_size=None, intensity=1.0,
@@ -86,7 +86,7 @@ pub(crate) fn reconstruct<'py>(
     Ok(PyArray2::from_owned_array(py, heights?))
 }
 
-/// Heights by a method that `KeyboardInterrupt` ends.
+/// Heights by a method that `KeyboardInterrupt` stops.
 fn heights(
     py: Python<'_>,
     pixel_size: [f64; 2],
@@ -118,23 +118,23 @@ fn heights(
     found.map_err(errors::refused)
 }
 
-/// Heights whose slopes are nearest to those given, with mean zero.
+/// Computes the heights whose slopes are closest to the given ones, with mean zero.
 ///
 /// Parameters
 /// ----------
 /// slope_x, slope_y : (rows, columns) arrays
 ///     ∂z/∂x along a row and ∂z/∂y down the rows.
 /// pixel_size : float or (x, y)
-///     Heights have its unit.
+///     Size of a pixel. Heights have its unit.
 /// method : str
 ///     "poisson" (the default) or "least-squares" (the default with a mask).
 /// mask : (rows, columns) array of bool
-///     True where there are heights.
+///     True at pixels with a height.
 ///
 /// Returns
 /// -------
 /// (rows, columns) array
-///     NaN where there is no height.
+///     NaN at pixels without a height.
 #[pyfunction]
 #[pyo3(signature = (slope_x, slope_y, pixel_size=None, *, method=None, mask=None))]
 pub(crate) fn integrate<'py>(
@@ -171,20 +171,20 @@ pub(crate) fn integrate<'py>(
     Ok(PyArray2::from_owned_array(py, heights?))
 }
 
-/// Depth of the contact in a frame of a sensor that grows darker where it is pressed.
+/// Computes the depth of the contact in a frame of a sensor that darkens under pressure.
 ///
 /// Parameters
 /// ----------
 /// frame, reference : (rows, columns) arrays of uint8
 /// table : (n, 2) array
-///     Grey levels below the reference and depth in metres.
+///     Grey levels below the reference and depths in metres.
 /// pixel_size : float or (x, y)
-///     Metres.
+///     Size of a pixel in metres.
 ///
 /// Returns
 /// -------
 /// Surface or None
-///     None where nothing touches.
+///     None without contact.
 #[pyfunction]
 pub(crate) fn depth(
     py: Python<'_>,
@@ -201,7 +201,7 @@ pub(crate) fn depth(
     let table = arrays::columns::<2>("table", table)?;
     let table: Vec<(f64, f64)> = table.into_iter().map(Into::into).collect();
     let size = arrays::pixel_size(pixel_size)?;
-    // Depth is read from the table whatever the object is.
+    // The depth follows from the table, whatever the object is.
     let unknown = rust::Object::Unknown {
         poisson_ratio: rust::Object::DEFAULT_POISSON_RATIO,
     };
