@@ -12,6 +12,7 @@
 //! forbid a pair, set its cost to `+∞`.
 
 use crate::MatchError;
+use crate::error::all_pairs;
 
 /// Returns the column of each row of a cost matrix of shape `[rows, columns]` at the least total
 /// cost.
@@ -22,7 +23,8 @@ use crate::MatchError;
 /// answer is deterministic, also among ties.
 ///
 /// # Errors
-/// [`MatchError::Cost`] for NaN and `−∞`.
+/// [`MatchError::Cost`] for NaN and `−∞`, [`MatchError::TooManyPairs`] if the costs would take
+/// more than 2 GiB.
 ///
 /// ```
 /// use tactile_match::linear_assignment;
@@ -71,6 +73,7 @@ impl Search {
         [rows, columns]: [usize; 2],
         mut cost: impl FnMut(usize, usize) -> f64,
     ) -> Result<(Self, Vec<f64>), MatchError> {
+        all_pairs(rows, columns)?;
         let mut checked = |row, column| match cost(row, column) {
             c if c.is_finite() || c > 0.0 => Ok(c),
             _ => Err(MatchError::Cost { row, column }),

@@ -18,7 +18,7 @@
 //! kernel is factorised once, to its numerical rank, instead of solving an `M × M` system in every
 //! iteration.
 
-use crate::error::{at_least_one, option_within, point_sets};
+use crate::error::{all_pairs, at_least_one, option_within, point_sets};
 use crate::frame::{Frame, spread};
 use crate::gaussian_process::{Axes, Detail, Prior, PriorScales, Regression};
 use crate::{Judgement, MatchError, Matching, StopReason, linear_assignment};
@@ -615,6 +615,7 @@ impl CoherentPointDrift {
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Matching<D>, MatchError> {
         point_sets(model, target)?;
+        all_pairs(model.len(), target.len())?;
         let mut registration = Registration::new(self, model, target);
         registration.run(watch);
         Ok(registration.matching(model, target))

@@ -65,6 +65,19 @@ pub enum MatchError {
         /// The range of valid values.
         expected: &'static str,
     },
+    /// A method that compares each model point with each target has too many of them.
+    #[error(
+        "{model} model points and {target} targets make more than {limit} pairs, which this method \
+         keeps in memory; the default matcher takes sets of this size"
+    )]
+    TooManyPairs {
+        /// Number of model points.
+        model: usize,
+        /// Number of targets.
+        target: usize,
+        /// Maximum number of pairs.
+        limit: usize,
+    },
     /// A cost is NaN or `−∞`.
     #[error("the cost of row {row}, column {column} is NaN or minus infinity")]
     Cost {
@@ -98,6 +111,24 @@ impl MatchError {
     pub fn custom(error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
         Self::Custom(CustomError::new(error))
     }
+}
+
+/// Maximum number of pairs of a table: 2 GiB of double precision.
+const MAX_PAIRS: usize = 1 << 28;
+
+/// Rejects sets whose table of all pairs is too large for the memory.
+///
+/// # Errors
+/// [`MatchError::TooManyPairs`].
+pub(crate) fn all_pairs(model: usize, target: usize) -> Result<(), MatchError> {
+    if model.saturating_mul(target) <= MAX_PAIRS {
+        return Ok(());
+    }
+    Err(MatchError::TooManyPairs {
+        model,
+        target,
+        limit: MAX_PAIRS,
+    })
 }
 
 /// Rejects empty sets and coordinates that are NaN, infinite or too large to be squared.

@@ -4,31 +4,40 @@ use crate::error::{point_sets, valid_distance};
 use crate::frame::{Frame, spread};
 use crate::interpolation::fitted;
 use crate::{Judgement, MatchError, Matching, PointMatcher, StopReason, linear_assignment};
-use nalgebra::{DMatrix, Point, SVector};
+use nalgebra::Point;
+use tactile_tps::nearest_rows;
 
-/// Both sets in a common frame, with all squared distances between them.
-struct Distances<const D: usize> {
+/// Number of nearest targets considered as partners of a model point. If two unrelated sets have
+/// the same density, the farthest of them is still seven standard deviations of the displacements
+/// away.
+const CANDIDATES: usize = 64;
+/// Squared distance beyond the nearest target, in variances, from which a target has no weight:
+/// exp(−16) is 1e-7 of the nearest target's. All targets are considered if the farthest candidate
+/// is nearer.
+const FAR: f64 = 32.0;
+
+/// Both sets in a common frame.
+struct Sets<const D: usize> {
     /// The common frame, to convert lengths.
     frame: Frame<D>,
-    target: Vec<SVector<f64, D>>,
-    /// `|x_i − y_j|²`, `I × J`, in the units of the frame.
-    squared: DMatrix<f64>,
+    model: Vec<Point<f64, D>>,
+    target: Vec<Point<f64, D>>,
 }
 
-impl<const D: usize> Distances<D> {
+impl<const D: usize> Sets<D> {
     fn new(model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Self {
         let frame = Frame::of_both(model, target);
         let inside =
-            |points: &[Point<f64, D>]| points.iter().map(|p| frame.inside(p)).collect::<Vec<_>>();
-        let (model, target) = (inside(model), inside(target));
-        let squared = DMatrix::from_fn(model.len(), target.len(), |i, j| {
-            (model[i] - target[j]).norm_squared()
-        });
+            |points: &[Point<f64, D>]| points.iter().map(|p| frame.inside(p).into()).collect();
         Self {
+            model: inside(model),
+            target: inside(target),
             frame,
-            target,
-            squared,
         }
+    }
+
+    fn squared(&self, i: usize, j: usize) -> f64 {
+        (self.model[i] - self.target[j]).norm_squared()
     }
 
     /// The square of a length of the caller, in the units of the frame. Infinite for `None`.
@@ -36,54 +45,64 @@ impl<const D: usize> Distances<D> {
         length.map_or(f64::INFINITY, |l| (l / self.frame.scale).powi(2))
     }
 
-    /// Probabilities of the targets for model point `i`, if its displacement has a normal
+    /// Probabilities of the candidates of model point `i`, if its displacement has a normal
     /// distribution of variance `variance` along each axis.
-    fn posterior(&self, i: usize, variance: f64) -> Vec<f64> {
-        let row = self.squared.row(i);
-        let least = row.iter().copied().fold(f64::INFINITY, f64::min);
-        let mut p: Vec<f64> = row
-            .iter()
-            .map(|&s| {
-                if s > least {
-                    (-0.5 * (s - least) / variance.max(f64::MIN_POSITIVE)).exp()
-                } else {
-                    1.0
-                }
-            })
-            .collect();
-        let sum: f64 = p.iter().sum();
-        p.iter_mut().for_each(|p| *p /= sum);
+    fn posterior(
+        &self,
+        i: usize,
+        candidates: impl Iterator<Item = usize>,
+        variance: f64,
+    ) -> Vec<(usize, f64)> {
+        let mut p: Vec<_> = candidates.map(|j| (j, self.squared(i, j))).collect();
+        let least = p.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
+        for (_, p) in &mut p {
+            *p = match *p > least {
+                true => (-0.5 * (*p - least) / variance.max(f64::MIN_POSITIVE)).exp(),
+                false => 1.0,
+            };
+        }
+        let sum: f64 = p.iter().map(|p| p.1).sum();
+        p.iter_mut().for_each(|p| p.1 /= sum);
         p
     }
 }
 
 /// Builds the result from these pairs. The warp is their local field; confidences and covariances
-/// follow from the distribution of the displacements.
+/// follow from the distribution of the displacements. `near` are the nearest targets of each model
+/// point, by rising row, or nothing if all targets may be partners.
 fn matching<const D: usize>(
     model: &[Point<f64, D>],
     target: &[Point<f64, D>],
-    distances: &Distances<D>,
+    sets: &Sets<D>,
     assignment: Vec<Option<usize>>,
+    near: &[Vec<usize>],
 ) -> Matching<D> {
     let partners = assignment.iter().enumerate();
     let pairs: Vec<_> = partners
         .filter_map(|(i, j)| Some((i, (*j)?, 1.0)))
         .collect();
-    let squares = pairs.iter().map(|&(i, j, _)| distances.squared[(i, j)]);
-    let total: f64 = squares.sum();
+    let total: f64 = pairs.iter().map(|&(i, j, _)| sets.squared(i, j)).sum();
     let variance = total / (pairs.len().max(1) * D) as f64;
-    let scale = distances.frame.scale;
+    let scale = sets.frame.scale;
     let (warp, warped) = fitted(model, target, &pairs);
     let mut found = Matching::new(target, warp, warped, assignment);
     for (i, partner) in found.assignment.iter().enumerate() {
-        let p = distances.posterior(i, variance);
-        found.confidence.push(partner.map_or(0.0, |j| p[j]));
-        let places = distances.target.iter().copied().zip(p.iter().copied());
+        let near = near.get(i).filter(|near| {
+            let squares = near.iter().map(|&j| sets.squared(i, j));
+            let range = squares.fold([f64::MAX, 0.0], |[a, b], s| [a.min(s), b.max(s)]);
+            range[1] - range[0] > FAR * variance
+        });
+        let p = match near {
+            Some(near) => sets.posterior(i, near.iter().copied(), variance),
+            None => sets.posterior(i, 0..target.len(), variance),
+        };
+        let of_partner = p.iter().find(|p| Some(p.0) == *partner);
+        found.confidence.push(of_partner.map_or(0.0, |p| p.1));
+        let places = p.iter().map(|&(j, p)| (sets.target[j].coords, p));
         let covariance = spread(places) * (scale * scale);
         found.displacement_covariance.push(covariance);
         // Soft matches below this weight are dropped.
-        let kept = p.iter().copied().enumerate();
-        let kept = kept.filter(|(_, p)| partner.is_some() && *p > 1e-4);
+        let kept = p.into_iter().filter(|p| partner.is_some() && p.1 > 1e-4);
         found.soft.push_row(kept);
     }
     found.energy = vec![total * scale * scale];
@@ -96,7 +115,7 @@ fn matching<const D: usize>(
 /// target, the closest of them gets it.
 ///
 /// The pairs are correct while displacements are smaller than half the distance between points. The
-/// warp is that of [`Matching::from_pairs`]. `O(I J)`.
+/// warp is that of [`Matching::from_pairs`]. `O((I + J) log J)`.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -130,11 +149,14 @@ impl<const D: usize> PointMatcher<D> for NearestNeighbour {
         target: &[Point<f64, D>],
     ) -> Result<Matching<D>, MatchError> {
         point_sets(model, target)?;
-        let distances = Distances::new(model, target);
-        let limit = distances.limit(self.max_distance);
+        let sets = Sets::new(model, target);
+        let limit = sets.limit(self.max_distance);
+        let mut near = nearest_rows(&sets.target, &sets.model, CANDIDATES);
         let mut holder: Vec<Option<(usize, f64)>> = vec![None; target.len()];
-        for i in 0..model.len() {
-            let (nearest, squared) = nearest(distances.squared.row(i).iter().copied());
+        for (i, near) in near.iter_mut().enumerate() {
+            let nearest = near[0];
+            near.sort_unstable();
+            let squared = sets.squared(i, nearest);
             if squared <= limit && holder[nearest].is_none_or(|(_, other)| squared < other) {
                 holder[nearest] = Some((i, squared));
             }
@@ -145,7 +167,7 @@ impl<const D: usize> PointMatcher<D> for NearestNeighbour {
                 assignment[*i] = Some(j);
             }
         }
-        Ok(matching(model, target, &distances, assignment))
+        Ok(matching(model, target, &sets, assignment, &near))
     }
 }
 
@@ -215,13 +237,13 @@ impl<const D: usize> PointMatcher<D> for LinearAssignment {
         target: &[Point<f64, D>],
     ) -> Result<Matching<D>, MatchError> {
         point_sets(model, target)?;
-        let distances = Distances::new(model, target);
-        let limit = distances.limit(self.max_distance);
-        let cost = |i, j| distances.squared[(i, j)].min(limit);
+        let sets = Sets::new(model, target);
+        let limit = sets.limit(self.max_distance);
+        let cost = |i, j| sets.squared(i, j).min(limit);
         let mut assignment = linear_assignment([model.len(), target.len()], cost)?;
         for (i, partner) in assignment.iter_mut().enumerate() {
-            *partner = partner.filter(|&j| distances.squared[(i, j)] <= limit);
+            *partner = partner.filter(|&j| sets.squared(i, j) <= limit);
         }
-        Ok(matching(model, target, &distances, assignment))
+        Ok(matching(model, target, &sets, assignment, &[]))
     }
 }

@@ -34,7 +34,7 @@
 
 mod relaxation;
 
-use crate::error::{at_least_one, option_within, point_sets};
+use crate::error::{all_pairs, at_least_one, option_within, point_sets};
 use crate::frame::{Frame, spread};
 use crate::interpolation::spline;
 use crate::{Judgement, MatchError, Matching, StopReason, linear_assignment};
@@ -368,6 +368,7 @@ impl RelaxationLabelling {
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Matching<D>, MatchError> {
         point_sets(model, target)?;
+        all_pairs(model.len(), target.len())?;
         let frames = [Frame::of(model), Frame::of(target)];
         let enter = |frame: &Frame<D>, points: &[Point<f64, D>]| -> Vec<Point<f64, D>> {
             points

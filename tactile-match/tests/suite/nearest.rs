@@ -1,7 +1,10 @@
 //! Nearest neighbours: the largest distance of a pair.
 
-use nalgebra::Point2;
-use tactile_match::{Matching, NearestNeighbour, PointMatcher};
+use nalgebra::{Point2, Vector2};
+use tactile_match::{
+    CoherentPointDrift, LinearAssignment, MatchError, Matching, NearestNeighbour, PointMatcher,
+    RelaxationLabelling,
+};
 
 fn partners(matcher: NearestNeighbour) -> Vec<Option<usize>> {
     let model = [[0.0, 0.0], [4.0, 0.0], [0.0, 4.0], [9.0, 9.0]].map(Point2::from);
@@ -22,4 +25,41 @@ fn no_pair_is_further_apart_than_the_limit() {
         assert_eq!(within[3], None, "its nearest has a nearer one");
     }
     assert_eq!(partners(NearestNeighbour::default())[..3], all);
+}
+
+/// Two sets of this size have more pairs than a table in memory may hold.
+#[test]
+fn large_sets_are_paired_by_distance_or_refused() {
+    // An even cover of the square, by powers of the plastic number.
+    let model: Vec<_> = (0..20_000)
+        .map(f64::from)
+        .map(|k| Point2::new((0.754_877_666 * k).fract(), (0.569_840_291 * k).fract()))
+        .collect();
+    // The spacing is 0.007, and the shift is too small for another point to come nearer.
+    let target: Vec<_> = model
+        .iter()
+        .rev()
+        .map(|p| p + Vector2::new(1e-6, 0.0))
+        .collect();
+    let found = NearestNeighbour::default()
+        .match_points(&model, &target)
+        .unwrap();
+    let right = |(i, j): (usize, &Option<usize>)| *j == Some(19_999 - i);
+    let right = found
+        .assignment
+        .iter()
+        .enumerate()
+        .filter(|&pair| right(pair))
+        .count();
+    assert_eq!(right, 20_000);
+    assert!(found.confidence.iter().all(|c| *c > 0.999));
+    let dense: [&dyn PointMatcher<2>; 3] = [
+        &LinearAssignment::default(),
+        &CoherentPointDrift::default(),
+        &RelaxationLabelling::default(),
+    ];
+    for method in dense {
+        let error = method.match_points(&model, &target).err().expect("refused");
+        assert!(matches!(error, MatchError::TooManyPairs { .. }), "{error}");
+    }
 }
