@@ -34,14 +34,15 @@ pub(crate) fn length_mm(text: &str) -> Result<f64, String> {
     physical(text, InputQuantity::Length, 1e-3, "mm")
 }
 
-/// An argument that is a size of a lump in millimetres. The mesh of a smaller one has no end.
+/// An argument that is the size of a lump in millimetres. The mesh of a smaller lump would be too
+/// large.
 pub(crate) fn lump_mm(text: &str) -> Result<f64, String> {
     let expected = "a number from 0.5 to 200 mm";
     number(text, |mm| (0.5..=200.0).contains(&mm), expected)
 }
 
-/// An argument that is an inclusion's modulus over that around it. Within a tenth of one it does
-/// not show.
+/// An argument that is the ratio of the modulus of an inclusion to that around it. Within a tenth
+/// of one the inclusion is not visible.
 pub(crate) fn contrast(text: &str) -> Result<f64, String> {
     let fits = |ratio: f64| (1.1..=1e3).contains(&ratio) || (1e-3..=0.9).contains(&ratio);
     number(text, fits, "a ratio from 1.1 to 1000, or from 0.001 to 0.9")
@@ -74,8 +75,8 @@ pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
     number(text, |v| v >= 0.0, "a number of at least zero")
 }
 
-/// An argument that is one positive number, or two between commas: the size of a pixel along x and
-/// y.
+/// An argument that is one positive number, or two separated by a comma: the size of a pixel along
+/// x and y.
 pub(crate) fn one_or_two(text: &str) -> Result<[f64; 2], String> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| positive(part.trim())).collect();
     match numbers.as_deref() {
@@ -91,10 +92,10 @@ pub(crate) fn name(value: impl ValueEnum) -> String {
     value.map_or(String::new(), |v| v.get_name().to_owned())
 }
 
-/// How often the work is done.
+/// Number of repetitions.
 #[derive(Args, Clone, Copy)]
 pub(crate) struct Repetition {
-    /// Do the work N times. The median of the times is given.
+    /// Repeat the computation N times. The median of the times is printed.
     #[arg(long, value_name = "N", default_value_t = 1,
           value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
     pub repeat: u32,
@@ -120,16 +121,16 @@ impl Repetition {
     }
 }
 
-/// How tables are read, if not as they show themselves.
+/// Options for tables whose format is not recognised.
 #[derive(Args)]
 pub(crate) struct TableArguments {
-    /// Columns that are read, in their order: by heading or by number from 1.
+    /// Columns to be read, in their order: by heading or by number from 1.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     columns: Vec<String>,
-    /// Lines before each table, of an instrument's preamble.
+    /// Number of lines before each table, for example the preamble of an instrument.
     #[arg(long, value_name = "LINES", default_value_t = 0)]
     skip_lines: usize,
-    /// Refuse rows without a number, which are left out else.
+    /// Refuse rows without a number instead of leaving them out.
     #[arg(long)]
     strict: bool,
 }
@@ -236,7 +237,7 @@ impl TableArguments {
     }
 }
 
-/// Frames of points. Their coordinates have a unit in all or in none.
+/// Frames of points. Either all of their coordinates have a unit, or none.
 pub(crate) struct PointFrames {
     pub frames: Vec<PointFrame>,
     /// The number of frames without points, which were passed over.
@@ -250,7 +251,7 @@ pub(crate) struct PointFrame {
     pub points: Points,
 }
 
-/// Prints what was taken for granted of a table.
+/// Prints the assumptions made for a table.
 fn taken(path: &Path, notes: &[String], context: &mut Context) {
     for note in notes {
         let sentence = format!("{}: {note}", path.display());
@@ -265,7 +266,7 @@ fn taken(path: &Path, notes: &[String], context: &mut Context) {
 /// Rows and columns of a file.
 pub(crate) type Shaped<'a> = (&'a Path, (usize, usize));
 
-/// Refuses a file of another shape than the first.
+/// An error if a file has another shape than the first.
 pub(crate) fn same_shape(
     (path, (rows, columns)): Shaped<'_>,
     (first, (first_rows, first_columns)): Shaped<'_>,
@@ -281,19 +282,19 @@ pub(crate) fn same_shape(
     )))
 }
 
-/// The part of a surface that is wanted, and its known heights.
+/// The part of a surface to be computed, and its known heights.
 #[derive(Args)]
 pub(crate) struct HeightRegion {
-    /// Image of the object: bright (above 127) pixels are solved for.
+    /// Image of the object: heights are computed at bright pixels (above 127).
     #[arg(long, value_name = "IMAGE")]
     pub mask: Option<PathBuf>,
-    /// Known heights, NaN where unknown.
+    /// Known heights, NaN if unknown.
     #[arg(long, value_name = "KNOWN.csv")]
     pub heights: Option<PathBuf>,
 }
 
 impl HeightRegion {
-    /// The files beside the first, which gives the shape.
+    /// The files other than the first, which determines the shape.
     pub(crate) fn files<'a>(&'a self, first: &'a [&'a Path]) -> Vec<&'a Path> {
         let own = self.mask.iter().chain(&self.heights).map(PathBuf::as_path);
         first.iter().copied().chain(own).collect()

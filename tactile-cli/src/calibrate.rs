@@ -21,21 +21,21 @@ use tactile_imaging::force::{
 
 /// Calibrate a sensor from frames of presses, or fit the line from pixel value to force
 ///
-/// CALIBRATION.toml names frames of rigid balls or flat punches of known radius under forces of a
-/// gauge, a frame without contact, a frame of a dot target where there is one, and the guide's
-/// layers as they are stated. The local light-to-pressure curve, the lens, the layers and the
-/// errors of all of them are found. --out sensor.toml gets the sensor file that scenes name, and
-/// sensor.svg beside it, the report of all that was identified by the presses and all that was not.
-/// Where the frames cannot be used nothing is written.
+/// CALIBRATION.toml lists frames of rigid balls or flat punches of known radius under forces
+/// measured by a gauge, a frame without contact, the stated layers of the guide and, if there is
+/// one, a frame of a dot target. The local light-to-pressure curve, the lens and the layers are
+/// determined with their errors. --out sensor.toml writes the sensor file for scenes, and next to
+/// it sensor.svg, a report of which properties the presses determine and which they do not. If the
+/// frames cannot be used, no file is written.
 ///
-/// With kind = "photometric" the file names presses of a ball on a gel that is lit in colours: a
-/// frame without contact, the pixel's size, and the ball's radius of every press, with its contact
-/// circle where it was drawn. Wrong circles are named. --out sensor.toml gets the sensor file for
-/// `tactile depth --sensor`, and the frame without contact beside it.
+/// With kind = "photometric" the file lists presses of a ball on a gel under coloured light: a
+/// frame without contact, the pixel size, and for every press the radius of the ball and optionally
+/// its drawn contact circle. Wrong circles are reported. --out sensor.toml writes the sensor file
+/// for `tactile depth --sensor`, and the frame without contact next to it.
 ///
 /// PAIRS.csv has the columns integrated_pixel_value (grey levels above the reference, summed over
-/// the contact) and force (N, mN, … by its heading), at least three rows. --out is a folder and
-/// gets calibration.svg.
+/// the contact) and force (N, mN, … according to its heading), in at least three rows. --out is a
+/// folder for calibration.svg.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -48,8 +48,8 @@ pub(crate) struct CalibrateArguments {
     /// Calibration file of a sensor (.toml), or table of integrated pixel values and forces.
     #[arg(value_name = "CALIBRATION.toml | PAIRS.csv")]
     input: PathBuf,
-    /// Of a table: the rows after the one of largest force were taken while unloading, hysteresis
-    /// is reported.
+    /// For a table: the rows after the largest force were taken during unloading. The hysteresis is
+    /// reported.
     #[arg(long)]
     there_and_back: bool,
     #[command(flatten)]
@@ -88,7 +88,7 @@ pub(crate) struct PairLine {
 }
 
 impl PairLine {
-    /// The name of its page.
+    /// File name of its page.
     pub(crate) const PAGE: &str = "calibration.svg";
 
     pub(crate) fn read(
@@ -107,7 +107,7 @@ impl PairLine {
         let pair = |(k, (value, force)): (usize, (&f64, &f64))| CalibrationPair {
             integrated_pixel_value: *value,
             force_n: *force,
-            // Forces grow up to the largest and fall after it.
+            // Forces increase up to the largest and decrease after it.
             branch: if there_and_back && largest.is_some_and(|largest| k > largest) {
                 Branch::Unloading
             } else {
@@ -226,7 +226,7 @@ fn calibrate_sensor(path: &Path, context: &mut Context) -> Result<Exit, Failure>
         return photometric::calibrate(path, &file, context);
     }
     let failed = |error: SensorError| match error {
-        // It names its file itself.
+        // The error itself names its file.
         SensorError::File(error) => Failure::input(error),
         error => Failure::in_file(path, error),
     };
@@ -319,7 +319,7 @@ fn sensor_value(found: &CalibratedSensor) -> Result<Value, Failure> {
     }))
 }
 
-/// Curve, residuals, contact radii, and the findings on every layer.
+/// Curve, residuals, contact radii, and the results for every layer.
 fn sensor_page(found: &CalibratedSensor) -> Page {
     let mut panels = vec![
         curve_panel(found),
@@ -354,7 +354,7 @@ fn curve_panel(found: &CalibratedSensor) -> Panel {
         .dashed(line(-1.96), Colour::Blue, "")
 }
 
-/// Adds a point a press to a panel, in its branch's colour.
+/// Adds one point per press to a panel, in the colour of its branch.
 fn with_presses(
     mut panel: Panel,
     found: &CalibratedSensor,
@@ -370,7 +370,7 @@ fn with_presses(
     panel
 }
 
-/// Force read with the curve against the gauge's.
+/// Force from the curve compared with the gauge.
 fn residual_panel(found: &CalibratedSensor) -> Panel {
     let error = |press: &PressFinding| {
         let read = press.read_force_n.filter(|_| press.force_n > 0.0)?;
@@ -383,7 +383,7 @@ fn residual_panel(found: &CalibratedSensor) -> Panel {
     with_presses(panel, found, error)
 }
 
-/// Contact radius over the gauge's force, and the force that the fitted layers have at that radius.
+/// Contact radius over the force of the gauge, and the force of the fitted layers at that radius.
 fn radius_panel(found: &CalibratedSensor) -> Panel {
     let radius = |press: &PressFinding| Some([press.force_n, 1e3 * press.contact_radius_m?.value]);
     let law = |p: &PressFinding| Some([p.layers_force_n?, 1e3 * p.contact_radius_m?.value]);
@@ -396,7 +396,7 @@ fn radius_panel(found: &CalibratedSensor) -> Panel {
     panel.rings(law, Colour::Black, "fitted layers")
 }
 
-/// A layer's parameter, and the finding on it.
+/// A parameter of a layer, and its result.
 fn layer_words(finding: &LayerFinding) -> [String; 2] {
     let (name, scale, unit) = match finding.parameter {
         "youngs_modulus_pa" => ("Young's modulus", 1e-3, " kPa"),

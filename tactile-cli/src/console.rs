@@ -1,4 +1,4 @@
-//! What every subcommand has at hand: the standard streams, Ctrl-C, the limit of memory and bars.
+//! Resources of every subcommand: the standard streams, Ctrl-C, the memory limit and progress bars.
 use crate::failure::{Exit, Failure};
 use crate::outputs::Outputs;
 use crate::text::printable;
@@ -14,17 +14,17 @@ use std::time::{Duration, Instant};
 use tactile_imaging::core::Progress;
 use tactile_imaging::pipeline::Flag;
 
-/// The standard streams, Ctrl-C, the limit of memory and the files to write.
+/// The standard streams, Ctrl-C, the memory limit and the files to be written.
 pub(crate) struct Context {
     /// One JSON object instead of text.
     pub json: bool,
-    /// JSON Lines: objects in a line each, that of the whole answer at the end.
+    /// JSON Lines: one object per line, with that of the whole result at the end.
     pub lines: bool,
     pub interrupt: Interrupt,
     pub outputs: Outputs,
     /// The subcommand, for the JSON object.
     command: String,
-    /// All cautions of the answer, as its JSON object has them.
+    /// All cautions of the result, in the format of its JSON object.
     cautions: Vec<Value>,
     reader_left: bool,
     error: Option<std::io::Error>,
@@ -33,7 +33,7 @@ pub(crate) struct Context {
 /// The version of the JSON objects that `docs/json.md` describes.
 const SCHEMA: &str = "tactile-2";
 
-/// What `--json` prints: the answer of a subcommand, and what all have in common.
+/// The output of `--json`: the result of a subcommand, and the common fields.
 #[derive(Serialize)]
 struct Envelope<'a, T> {
     schema: &'a str,
@@ -57,8 +57,8 @@ impl Context {
         }
     }
 
-    /// Prints a line of the result, unless JSON is wanted. A reader that goes away (`| head -1`)
-    /// ends the printing, not the program.
+    /// Prints a line of the result, unless JSON is requested. If the reader of the output closes it
+    /// (`| head -1`), only the printing ends, not the program.
     pub(crate) fn line(&mut self, text: impl Display) {
         let text = text.to_string();
         if let Some(report) = &mut self.outputs.report {
@@ -67,7 +67,7 @@ impl Context {
         self.aside(text);
     }
 
-    /// Prints what says how fast the work was, and does not belong on a report.
+    /// Prints information on the speed of the computation, which is not part of a report.
     pub(crate) fn aside(&mut self, text: impl Display) {
         if self.json || self.reader_left || self.error.is_some() {
             return;
@@ -88,7 +88,7 @@ impl Context {
         self.aside(format_args!("{name:<18}{value}"));
     }
 
-    /// Prints a line of a name and its value, the answer of the call.
+    /// Prints a line with a name and its value, as the main result of the call.
     pub(crate) fn answer(&mut self, name: &str, value: impl Display) {
         let value = value.to_string();
         if let Some(report) = &mut self.outputs.report {
@@ -97,8 +97,7 @@ impl Context {
         self.row(name, value);
     }
 
-    /// A sentence about an input that is left out, for the person at the terminal, the report and the
-    /// JSON object.
+    /// A sentence about an omitted input, for the terminal, the report and the JSON object.
     pub(crate) fn caution(&mut self, text: impl Display) {
         let text = text.to_string();
         self.cautions
@@ -109,8 +108,8 @@ impl Context {
         self.note(text);
     }
 
-    /// Prints a caution about the answer, and keeps it for the JSON object: a kind, its numbers (an
-    /// object, or null) and its sentence.
+    /// Prints a caution about the result, and stores it for the JSON object: a kind, its numbers
+    /// (an object, or null) and its sentence.
     pub(crate) fn warn(&mut self, kind: &str, numbers: Value, sentence: impl Display) {
         let sentence = sentence.to_string();
         if let Some(report) = &mut self.outputs.report {
@@ -124,7 +123,7 @@ impl Context {
         self.cautions.push(caution);
     }
 
-    /// The cautions about a frame, in a line each. The frame's name stands above them.
+    /// The cautions about a frame, one per line, below the name of the frame.
     pub(crate) fn warn_of_frame(&mut self, flags: &[Flag]) {
         for flag in flags {
             let sentence = flag.to_string();
@@ -141,7 +140,7 @@ impl Context {
         self.keep_cautions(flags);
     }
 
-    /// Keeps cautions that were printed for the JSON object. The first frame is frame 1.
+    /// Stores printed cautions for the JSON object. The first frame is frame 1.
     pub(crate) fn keep_cautions(&mut self, flags: &[Flag]) {
         for flag in flags {
             if let Some(report) = &mut self.outputs.report {
@@ -156,7 +155,7 @@ impl Context {
         }
     }
 
-    /// Prints the result as JSON, where it is wanted, with the cautions so far.
+    /// Prints the result as JSON, if requested, with the cautions so far.
     pub(crate) fn value(&mut self, answer: &impl Serialize) {
         let cautions = std::mem::take(&mut self.cautions);
         let command = self.command.clone();
@@ -169,12 +168,12 @@ impl Context {
         self.cautions = cautions;
     }
 
-    /// Prints a value as JSON, where it is wanted.
+    /// Prints a value as JSON, if requested.
     pub(crate) fn print_json(&mut self, value: &impl Serialize) {
         if !self.json || self.reader_left || self.error.is_some() {
             return;
         }
-        // Number by number: as one text the result of many frames would take as much memory again.
+        // Number by number, because the text of the result of many frames would double the memory.
         let mut output = BufWriter::new(stdout().lock());
         let written = match self.lines {
             true => serde_json::to_writer(&mut output, value),
@@ -190,20 +189,20 @@ impl Context {
         }
     }
 
-    /// A sentence for the person at the terminal, on standard error.
+    /// A sentence for the user on standard error.
     pub(crate) fn note(&self, text: impl Display) {
-        // Nothing can be done about a standard error that is closed.
+        // A closed standard error is ignored.
         let _ = writeln!(stderr(), "tactile: {}", printable(&text.to_string()));
     }
 
-    /// Refuses a job that needs more memory than is allowed. `job` names it and its size, `remedy`
-    /// the way out.
+    /// An error if a job needs more memory than allowed. `job` is its name and size, `remedy` the
+    /// advice in the message.
     pub(crate) fn allow(&self, bytes: f64, job: &str, remedy: &str) -> Result<(), Failure> {
         self.outputs.allow(bytes, job, remedy)
     }
 
-    /// Runs a job that can neither stop nor report its progress, with its time so far on the
-    /// terminal. It is none after Ctrl-C, which leaves the job to end with the program.
+    /// Runs a job that can neither be stopped nor report its progress, with the elapsed time on the
+    /// terminal. Returns `None` after Ctrl-C; the job then ends with the program.
     pub(crate) fn wait<R: Send + 'static>(
         &self,
         job: impl Into<String>,
@@ -212,19 +211,20 @@ impl Context {
         let _clock = Bar::clock(job);
         let (answer, answered) = mpsc::channel();
         self.interrupt.polled(true);
-        // The library has no way to stop this work: it runs beside the thread that listens for
-        // Ctrl-C.
+        // The library cannot stop this computation: it runs in a separate thread while this one
+        // waits for Ctrl-C.
         let work = Arc::new(Mutex::new(Some(work)));
         let job = Arc::clone(&work);
         let take = |job: &Mutex<Option<_>>| job.lock().ok().and_then(|mut job| job.take());
         let worker = std::thread::Builder::new().spawn(move || {
             if let Some(work) = take(&job) {
-                // Nobody waits for the answer any more after Ctrl-C.
+                // After Ctrl-C the result is no longer needed.
                 let _ = answer.send(work());
             }
         });
         let Ok(worker) = worker else {
-            // The system allows no more threads: the work runs here, and Ctrl-C ends the program.
+            // The system allows no more threads: the computation runs here, and Ctrl-C ends the
+            // program.
             self.interrupt.polled(false);
             return take(&work).map(|work| work());
         };
@@ -239,12 +239,12 @@ impl Context {
                 },
             }
         };
-        // What follows is short or listens by itself.
+        // The following work is short or checks for Ctrl-C itself.
         self.interrupt.polled(false);
         result
     }
 
-    /// Runs a search for inclusions with its progress, which Ctrl-C ends.
+    /// Runs a search for inclusions with its progress. Ctrl-C stops it.
     pub(crate) fn reported<T>(
         &self,
         name: &'static str,
@@ -261,9 +261,9 @@ impl Context {
         found
     }
 
-    /// Writes the files of a call that has its answer, and returns the exit code.
+    /// Writes the files of a call that has its result, and returns the exit code.
     pub(crate) fn close(mut self, ended: Result<Exit, Failure>) -> Exit {
-        // The answer is printed by now: a folder that cannot be written withholds nothing.
+        // The result has already been printed, so that an unwritable folder loses nothing.
         let ended = ended.and_then(|exit| {
             self.outputs.finish_report();
             let [written, kept] = {
@@ -291,14 +291,14 @@ impl Context {
                 self.note(format_args!("cannot write to standard output: {error}"));
                 Exit::Output
             }
-            // Partial results of an interrupted run do not pass for complete ones.
+            // Partial results of an interrupted run must not look complete.
             None if self.interrupt.requested() => Exit::Interrupted,
             None => exit,
         }
     }
 
     fn keep(&mut self, error: std::io::Error) {
-        // A reader that has seen enough is no failure, a full disk is.
+        // A closed pipe is not a failure, but a full disk is.
         if error.kind() == ErrorKind::BrokenPipe {
             self.reader_left = true;
         } else if self.error.is_none() {
@@ -307,19 +307,20 @@ impl Context {
     }
 }
 
-/// Ctrl-C, termination or a terminal that closes: work that polls it stops with its results so far,
-/// other work ends at once. A second one always ends.
+/// Ctrl-C, termination or a closed terminal. Computations that poll it stop with their results so
+/// far, and others end immediately. A second signal always ends the program.
 #[derive(Clone, Default)]
 pub(crate) struct Interrupt {
     requested: Arc<AtomicBool>,
     polled: Arc<AtomicBool>,
-    /// Held while files get their names.
+    /// Locked while files are renamed.
     writing: Arc<Mutex<()>>,
 }
 
 impl Interrupt {
-    /// Listens for the signals. Where the system allows no handler they end the program, as without
-    /// one. Under `nohup`, which lets no terminal close a program, they keep their meaning.
+    /// Installs the handler of the signals. If the system does not allow a handler, the signals end
+    /// the program, as usual. Under `nohup`, which protects a program from a closed terminal, they
+    /// keep their meaning.
     fn install() -> Self {
         let interrupt = Self::default();
         if hang_up_is_ignored() {
@@ -329,7 +330,7 @@ impl Interrupt {
         let _ = ctrlc::set_handler(move || {
             let again = copy.requested.swap(true, Ordering::SeqCst);
             if again || !copy.polled.load(Ordering::SeqCst) {
-                // A file that replaces another has a name beside it for a moment.
+                // A file that replaces another has a temporary name for a moment.
                 let _whole = (!again).then(|| copy.writing.lock());
                 std::process::exit(Exit::Interrupted.code().into());
             }
@@ -341,7 +342,7 @@ impl Interrupt {
         self.requested.load(Ordering::SeqCst)
     }
 
-    /// The answer to a job that asks whether to go on.
+    /// Whether a job should continue.
     pub(crate) fn flow(&self) -> ControlFlow<()> {
         if self.requested() {
             ControlFlow::Break(())
@@ -350,8 +351,7 @@ impl Interrupt {
         }
     }
 
-    /// Announces that the work from here on polls [`requested`](Self::requested), or no longer
-    /// does.
+    /// States whether the following computation polls [`requested`](Self::requested).
     pub(crate) fn polled(&self, polled: bool) {
         self.polled.store(polled, Ordering::SeqCst);
     }
@@ -368,30 +368,30 @@ fn hang_up_is_ignored() -> bool {
     ignored.is_some_and(|mask| mask & 1 == 1)
 }
 
-/// A bar on the terminal for a job that takes longer than a second. It is hidden where standard
-/// error is no terminal.
+/// A progress bar for a job of more than a second. It is hidden if standard error is not a
+/// terminal.
 pub(crate) struct Bar {
     bar: ProgressBar,
     started: Instant,
     shown: bool,
-    /// Dropped at the end, which the thread of a clock waits for.
+    /// Dropped at the end, for which the thread of a clock waits.
     end: Option<mpsc::Sender<()>>,
 }
 
 impl Bar {
-    /// Of a job of `total` steps.
+    /// Creates a bar for a job of `total` steps.
     pub(crate) fn of(total: usize, job: impl Into<String>) -> Self {
         let bar = ProgressBar::with_draw_target(Some(total as u64), ProgressDrawTarget::hidden());
         Self::styled(bar, "{msg} [{bar:32}] {percent} %, {eta} left", job)
     }
 
-    /// Of a job that does not report its progress: a clock that runs by itself.
+    /// Creates a clock for a job that does not report its progress.
     pub(crate) fn clock(job: impl Into<String>) -> Self {
         let mut progress = Self::styled(ProgressBar::hidden(), "{spinner} {msg}, {elapsed}", job);
         let bar = progress.bar.clone();
         let (end, ended) = mpsc::channel::<()>();
         progress.end = Some(end);
-        // Without a thread the job has no clock.
+        // Without a thread there is no clock.
         let _ = std::thread::Builder::new().spawn(move || {
             let still_runs = Err(mpsc::RecvTimeoutError::Timeout);
             if ended.recv_timeout(Duration::from_secs(1)) == still_runs {
@@ -415,7 +415,7 @@ impl Bar {
         }
     }
 
-    /// Shows that this many steps are done.
+    /// Shows the number of completed steps.
     pub(crate) fn done(&mut self, steps: usize) {
         self.bar.set_position(steps as u64);
         if !self.shown && self.started.elapsed() > Duration::from_secs(1) {

@@ -1,4 +1,4 @@
-//! `tactile depth`: contact and depth of a sensor that grows darker where it is pressed.
+//! `tactile depth`: contact and depth of a sensor that darkens under pressure.
 use crate::arguments::TableArguments;
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
@@ -22,19 +22,22 @@ use tactile_imaging::pipeline::{
 
 /// Find the contact and its depth in frames of a sensor that grows darker with depth
 ///
-/// TABLE.csv says how deep a darkness is: columns darkness (grey levels below the reference, of the
-/// same --grey) and depth (m, mm, µm, by its heading, mm without one). With --ball-radius-mm a ball
-/// of this radius is fitted to the depth, with --ball one of any. --out gets NAME_depth.csv (m, NaN
-/// outside the contacts, of the whole frame) and NAME_depth.svg for every frame NAME.
+/// TABLE.csv gives depth as a function of darkening: columns darkness (grey levels below the
+/// reference, with the same --grey) and depth (m, mm or µm according to its heading, mm without
+/// one). With --ball-radius-mm a ball of this radius is fitted to the depth, with --ball a ball of
+/// any radius. --out gets NAME_depth.csv (m, NaN outside the contacts, for the whole frame) and
+/// NAME_depth.svg for every frame NAME.
 ///
-/// No darkness is no depth. A table with the row 0, 0 is read as it stands. Another counts from a
-/// contact circle that was found at some darkness, as those of 9DTact do: it is shifted.
+/// No darkening is no depth. A table with the row 0, 0 is used unchanged. Other tables, such as
+/// those of 9DTact, count depth from a contact circle that was found at some darkening: they are
+/// shifted.
 ///
-/// --sensor names a gel that is lit in colours, as `tactile calibrate` wrote it. It takes the place
-/// of reference, table and pixel size. --out gets NAME_depth.csv (how far the face has moved, m, of
-/// the whole frame, zero far away), NAME_gradient_x.csv and NAME_gradient_y.csv (of the depth, along
-/// columns and rows), NAME_contact.csv (the contact of every pixel, from 1; 0 where nothing touches),
-/// NAME.ply (a mesh, mm), NAME.npz and NAME_depth.svg.
+/// --sensor is the sensor file of a gel under coloured light, written by `tactile calibrate`. It
+/// replaces reference, table and pixel size. --out then gets NAME_depth.csv (displacement of the
+/// surface, m, for the whole frame, zero far from contacts), NAME_gradient_x.csv and
+/// NAME_gradient_y.csv (gradient of the depth along columns and rows), NAME_contact.csv (the
+/// contact of every pixel from 1, and 0 without contact), NAME.ply (a mesh, mm), NAME.npz and
+/// NAME_depth.svg.
 #[derive(Args)]
 #[command(
     mut_arg("reference", |arg| unless_sensor(arg, ".")),
@@ -52,12 +55,12 @@ Examples:
 pub(crate) struct DepthArguments {
     #[command(flatten)]
     frames: SensorFrames,
-    /// Sensor file of a gel that is lit in colours.
+    /// Sensor file of a gel under coloured light.
     #[arg(long, value_name = "SENSOR.toml",
           conflicts_with_all = ["reference", "pixel_um", "table", "ball", "ball_radius_mm",
                                 "zero_table"])]
     sensor: Option<PathBuf>,
-    /// Table of darkness and depth.
+    /// Table of darkening and depth.
     #[arg(long, value_name = "TABLE.csv")]
     table: PathBuf,
     /// Fit a ball of this radius in mm.
@@ -66,11 +69,11 @@ pub(crate) struct DepthArguments {
     /// Fit a ball of any radius.
     #[arg(long, conflicts_with = "ball_radius_mm")]
     ball: bool,
-    /// Shift the table so that no darkness is no depth, also one with the row 0, 0. Refused where
+    /// Shift the table so that no darkening is no depth, even if it has the row 0, 0. An error if
     /// the table does not determine its zero.
     #[arg(long)]
     zero_table: bool,
-    /// How the colours of a frame make its grey: as those of the table were made.
+    /// Conversion of colours to grey, as for the table.
     #[arg(long, value_enum, default_value_t = GreyOf::Rec601)]
     grey: GreyOf,
     #[command(flatten)]
@@ -107,7 +110,8 @@ impl DepthArguments {
             let zeroed = table.clone().zeroed().map_err(PipelineError::DepthTable);
             zeroed.map_err(in_table)?;
         }
-        // Depth is read from the table whatever the object is: it only says what may be fitted.
+        // The depth follows from the table, whatever the object is. The object only determines the
+        // fits.
         let unknown = Object::Unknown {
             poisson_ratio: Object::DEFAULT_POISSON_RATIO,
         };
@@ -118,7 +122,7 @@ impl DepthArguments {
         Ok((pipeline.with_surface(table, SurfaceInput::Signal), gel))
     }
 
-    /// The ball that was asked for.
+    /// The requested ball.
     fn fitted(&self, surface: &ContactSurface) -> Option<Result<BallFit, &'static str>> {
         let fit = if self.ball {
             surface.fit_any_ball()
@@ -151,7 +155,7 @@ pub(crate) fn run(arguments: &DepthArguments, context: &mut Context) -> Result<E
     let reading = frames.reading(grey, &reference);
     let (images, unreadable) = reading.all::<Array2<u8>>(&frames.frames, context)?;
     let mut exit = Exit::complete_if(unreadable == 0);
-    // Frames are held, and each has a surface with its plot.
+    // Frames are kept in memory, and each has a surface with its plot.
     let pixels = (reference.len() * images.len()) as f64;
     let job = format!("the depth of {} frames", images.len());
     context.allow(40.0 * pixels, &job, "give fewer or smaller frames")?;
@@ -220,7 +224,7 @@ pub(crate) fn run(arguments: &DepthArguments, context: &mut Context) -> Result<E
     Ok(exit)
 }
 
-/// Prints every contact of a frame with several. What stands above them is the widest's.
+/// Prints every contact of a frame with several. The lines above belong to the widest.
 fn print_all(frame: &DarkFrame, context: &mut Context) {
     let count = frame.contacts.len();
     for (k, contact) in frame.contacts.iter().enumerate() {
@@ -300,11 +304,11 @@ fn print(found: &Found, context: &mut Context) -> Value {
     })
 }
 
-/// Mean measured depth and the ball's by distance from the ball's centre, in mm: distance,
-/// measured, ball.
+/// Mean measured depth and depth of the ball as a function of the distance from the centre of the
+/// ball, in mm: distance, measured, ball.
 fn profile(surface: &ContactSurface, ball: &BallFit) -> Vec<[f64; 3]> {
     let ([x0, y0], [dx, dy]) = (surface.origin_m, surface.pixel_size_m);
-    // Twenty rings, a fifth of the radius beyond the contact.
+    // Twenty rings up to a fifth of the radius outside the contact.
     let width = ball.contact_radius_m * 1.2 / 20.0;
     let mut rings = [[0.0; 4]; 20];
     for ((row, column), h) in surface.surface.heights.indexed_iter() {

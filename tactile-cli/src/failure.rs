@@ -1,21 +1,21 @@
-//! Exit codes, and why a call came to nothing.
+//! Exit codes, and the reason of a failed call.
 use crate::text::printable;
 use std::fmt::{self, Display};
 use std::path::Path;
 use tactile_files::io::FileError;
 
-/// The exit codes, as the help of the program lists them.
+/// The exit codes, as listed in the help of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Exit {
-    /// All that was asked for is there.
+    /// All requested results are available.
     Complete,
-    /// Something is there, but a stage has no answer. It is printed with its reason.
+    /// Some results are available, but a stage failed. Its reason is printed.
     Partial,
-    /// Arguments or input that cannot be used: nothing was computed.
+    /// Unusable arguments or input: nothing was computed.
     Input,
-    /// The answer could not be written.
+    /// The result could not be written.
     Output,
-    /// Stopped by Ctrl-C or a signal of its kind, after the results at that time were printed.
+    /// Stopped by Ctrl-C or a similar signal, after the results so far were printed.
     Interrupted,
 }
 
@@ -30,7 +30,7 @@ impl Exit {
         }
     }
 
-    /// Complete or, where something is missing, partial.
+    /// Complete, or partial if results are missing.
     pub(crate) fn complete_if(complete: bool) -> Self {
         if complete {
             Self::Complete
@@ -40,7 +40,7 @@ impl Exit {
     }
 }
 
-/// Why a call came to nothing, in one sentence.
+/// The reason of a failed call, in one sentence.
 #[derive(Debug)]
 pub(crate) struct Failure {
     pub exit: Exit,
@@ -63,12 +63,12 @@ impl Failure {
         Self::input(format!("{}: {error}", path.display()))
     }
 
-    /// The input is fine, but there is no answer.
+    /// The input is valid, but there is no result.
     pub(crate) fn no_answer(sentence: impl Display) -> Self {
         Self::new(Exit::Partial, sentence)
     }
 
-    /// The answer could not be written.
+    /// The result could not be written.
     pub(crate) fn output(sentence: impl Display) -> Self {
         Self::new(Exit::Output, sentence)
     }

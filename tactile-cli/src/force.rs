@@ -19,8 +19,8 @@ use tactile_imaging::pipeline::{ContactReading, Object, Session, Update};
 /// Measure force, contact radius, centroid and stress in frames of a sensor that grows brighter
 /// where it is pressed
 ///
-/// Fits the calibration to the pairs first and reports it, see `tactile calibrate`. --out gets
-/// force.csv (a row a frame) and calibration.svg.
+/// First fits and reports the calibration (see `tactile calibrate`). --out gets force.csv (one row
+/// per frame) and calibration.svg.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -52,7 +52,7 @@ pub(crate) fn run(arguments: &ForceArguments, context: &mut Context) -> Result<E
         .plan(&[table, PairLine::PAGE], &frames.files(pairs))?;
     let line = PairLine::read(pairs, false, reading, context)?;
     let image = frames.read_reference(Grey::default())?;
-    // Forces are read from the light whatever the object is.
+    // Forces follow from the light, whatever the object is.
     let object = Object::Unknown {
         poisson_ratio: Object::DEFAULT_POISSON_RATIO,
     };
@@ -61,7 +61,7 @@ pub(crate) fn run(arguments: &ForceArguments, context: &mut Context) -> Result<E
         .and_then(|pipeline| Session::new(&pipeline, &[image.view()]))
         .map_err(|error| Failure::in_file(&frames.reference, error))?;
     let read_frames = frames.reading(Grey::default(), &image);
-    // A call without a frame that can be read prints nothing.
+    // Without a readable frame, the heading is not printed.
     let mut heading = Some(&line);
     let mut exit = Exit::Complete;
     let mut values = Vec::new();
@@ -142,7 +142,7 @@ fn print(answer: Option<&Answer>, context: &mut Context) {
     }
 }
 
-/// A frame's row, with NaN where there is no contact.
+/// The row of a frame, with NaN without contact.
 fn row(k: usize, answer: Option<&Answer>) -> Vec<f64> {
     let numbers = match answer {
         Some(answer) => {

@@ -1,4 +1,4 @@
-//! Where a lump could be without being found.
+//! Positions at which a lump could be present without being found.
 use crate::console::Context;
 use crate::plot::{Colour, Panel, circle};
 use serde::Serialize;
@@ -6,24 +6,24 @@ use tactile_files::scene::LoadedInclusion;
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::inclusion::{InclusionSearch, TissueBlock};
 
-/// Places across a face: the limits change little from one to the next.
+/// Number of positions across a face: the limits change little from one to the next.
 const PLACES: f64 = 16.0;
 
-/// The depth whose map is drawn, the second: lumps are mostly a few millimetres deep.
+/// Index of the depth whose map is drawn: lumps are mostly a few millimetres deep.
 const SHOWN_DEPTH: usize = 1;
 
-/// The largest balls that searches miss, on a grid of places and depths.
+/// The largest balls that searches miss, on a grid of positions and depths.
 #[derive(Serialize)]
 pub(crate) struct Hidden {
-    /// Modulus of the ball over the tissue's.
+    /// Ratio of the modulus of the ball to that of the tissue.
     contrast: f64,
     positions_m: Vec<[f64; 2]>,
     depths_m: Vec<f64>,
-    /// For each depth, one for each place. Infinite where every ball would be missed.
+    /// One list per depth with one diameter per position: infinite if every ball would be missed.
     diameters_m: Vec<Vec<f64>>,
-    /// Where the next press would search most.
+    /// Position at which the next press would search most.
     next_position_m: Option<[f64; 2]>,
-    /// Where the guide's axis was at each press, and the radius that is searched about it.
+    /// Positions of the axis of the guide in the presses, and the radius searched about each.
     #[serde(skip)]
     axes_m: Vec<[f64; 2]>,
     #[serde(skip)]
@@ -31,7 +31,7 @@ pub(crate) struct Hidden {
 }
 
 impl Hidden {
-    /// With its progress, which Ctrl-C ends.
+    /// Computes the balls, with progress. Ctrl-C stops it.
     pub(crate) fn new(
         search: &InclusionSearch,
         loaded: &LoadedInclusion,
@@ -56,8 +56,9 @@ impl Hidden {
         let diameters_m = context.reported("what could hide", |report| {
             search.detection_limits(&loaded.scan, contrast, &positions_m, &depths_m, report)
         })?;
-        // A press is solved as if it were in the middle of the block: a block's height away from
-        // its rim, or as near as those that were made. On top of another it searches little more.
+        // A press is solved as if it were in the middle of the block: a block height away from the
+        // rim, or as near to it as the presses made. A press on top of another searches little
+        // more.
         let made = axes_m.iter().map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max);
         let farthest = (block.radius_m() - block.height_m() - face_m).max(made);
         let candidates: Vec<[f64; 2]> = (positions_m.iter().copied())
@@ -80,7 +81,7 @@ impl Hidden {
         })
     }
 
-    /// Prints the range over all places that are searched, depth by depth.
+    /// Prints the range over all searched positions, for each depth.
     pub(crate) fn print(&self, context: &mut Context) {
         context.line(format_args!(
             "could hide: a ball of {} times the tissue's modulus",
@@ -110,7 +111,7 @@ impl Hidden {
         }
     }
 
-    /// From above at one depth, and in section.
+    /// Panels from above at one depth, and in section.
     pub(crate) fn panels(&self) -> [Panel; 2] {
         let label = "hidden up to (mm)";
         let title = format!(
@@ -127,7 +128,7 @@ impl Hidden {
             let outline = circle(axis.map(|x| 1e3 * x), 1e3 * self.reach_m);
             above = above.line(outline, Colour::Orange, name);
         }
-        // The row of places that is nearest to the first press's axis.
+        // The row of positions that is nearest to the axis of the first press.
         let rows = self.positions_m.iter().map(|place| place[1]);
         let away = |y: &f64| (y - self.axes_m[0][1]).abs();
         let row = rows.min_by(|a, b| away(a).total_cmp(&away(b)));
@@ -148,7 +149,7 @@ impl Hidden {
         [above, section]
     }
 
-    /// Places and diameters in millimetres at one depth, where there is a limit.
+    /// Positions and diameters in millimetres at one depth, if there is a limit.
     fn shown(
         &self,
         depth: usize,
@@ -160,7 +161,7 @@ impl Hidden {
     }
 }
 
-/// Distance of a place from the nearest of some axes.
+/// Distance of a position from the nearest of several axes.
 fn nearest(axes_m: &[[f64; 2]], [x, y]: [f64; 2]) -> f64 {
     let distances = axes_m.iter().map(|axis| (x - axis[0]).hypot(y - axis[1]));
     distances.fold(f64::INFINITY, f64::min)

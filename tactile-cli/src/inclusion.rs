@@ -23,15 +23,16 @@ use tactile_imaging::pipeline::{interval_text, with_error};
 
 /// Find a lump under the surface of a block: its size, depth and stiffness
 ///
-/// SCENE.toml names frames of the guide pressed onto a flat block at known approaches, the block's
-/// size and the guide's layers (examples/data/inclusion/scene.toml is one). Without it a block with
-/// a lump is simulated. The pressure over the radius is compared with finite elements at finite
-/// strain, that over the whole face where it is not symmetric: the lump may lie off the axis. Of
-/// several presses at stated places the answer is one for all, and the lump may lie under any of
-/// them. It may be flatter or taller than a ball, and its diameter is that of the ball of equal
-/// volume. The answer is whether there is a lump, its place, diameter, depth, modulus and height
-/// over width with 95 % intervals, or which of them the frames leave open. --out gets profiles.csv
-/// and inclusion.svg. A search takes some seven seconds for each kind of interface.
+/// SCENE.toml describes frames of the guide pressed onto a flat block at known approaches, the size
+/// of the block and the layers of the guide (for an example see
+/// examples/data/inclusion/scene.toml). Without it a block with a lump is simulated. The pressure
+/// as a function of the radius is compared with finite elements at finite strain. If it is not
+/// symmetric, the whole face is compared, and the lump may lie off the axis. Several presses at
+/// stated positions are evaluated together, and the lump may lie under any of them. It may be
+/// flatter or taller than a ball; its diameter is that of the ball of equal volume. The result is
+/// whether there is a lump, and its position, diameter, depth, modulus and height over width with
+/// 95 % intervals. Parameters that the frames do not determine are named. --out gets profiles.csv
+/// and inclusion.svg. A search takes about seven seconds for each kind of interface.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -60,27 +61,27 @@ pub(crate) struct InclusionArguments {
     /// Scene file.
     #[arg(value_name = "SCENE.toml")]
     scene: Option<PathBuf>,
-    /// Instead of searching, compare what scans with other approaches would tell of a lump in this
-    /// block.
+    /// Instead of searching, compare how well scans with different approaches would determine a
+    /// lump in this block.
     #[arg(long)]
     design: bool,
     /// Design: diameter of the lump, in millimetres.
     #[arg(long, value_name = "MM", default_value = "10", value_parser = lump_mm,
           requires = "design")]
     diameter_mm: f64,
-    /// Design: depth of its top, in millimetres.
+    /// Design: depth of the top of the lump, in millimetres.
     #[arg(long, value_name = "MM", default_value = "4", value_parser = lump_mm,
           requires = "design")]
     depth_mm: f64,
-    /// Design: its modulus, in kPa.
+    /// Design: modulus of the lump, in kPa.
     #[arg(long, value_name = "KPA", default_value = "40", value_parser = modulus_kpa,
           requires = "design")]
     lump_kpa: f64,
-    /// Design: the tissue's modulus, in kPa.
+    /// Design: modulus of the tissue, in kPa.
     #[arg(long, value_name = "KPA", default_value = "5", value_parser = modulus_kpa,
           requires = "design")]
     tissue_kpa: f64,
-    /// Simulation: seed of the camera's noise.
+    /// Simulation: seed of the camera noise.
     #[arg(
         long,
         default_value_t = 1,
@@ -88,25 +89,25 @@ pub(crate) struct InclusionArguments {
         conflicts_with = "scene"
     )]
     seed: u64,
-    /// Also compute how large a ball could be there without being found, place by place. RATIO is
-    /// its modulus over the tissue's.
+    /// Also compute how large a ball could be at each position without being found. RATIO is its
+    /// modulus divided by that of the tissue.
     #[arg(long, value_name = "RATIO", requires = "scene", conflicts_with = "design",
           value_parser = contrast, allow_negative_numbers = true)]
     hidden: Option<f64>,
 }
 
-/// The input of a search, and the truth where it is known.
+/// The input of a search, and the truth if it is known.
 struct Scan {
     specimen: TissueBlock,
     guide: Guide,
     radii_m: Vec<f64>,
     profiles: Vec<PressureProfile>,
-    /// First harmonic of the pressure around the axis over its mean, and the higher ones.
+    /// First harmonic of the pressure around the axis relative to its mean, and the higher ones.
     asymmetry: f64,
     harmonics: f64,
     /// Diameter, depth and modulus.
     truth: Option<[f64; 3]>,
-    /// What was read from a scene.
+    /// The input from a scene.
     loaded: Option<LoadedInclusion>,
 }
 
@@ -130,7 +131,7 @@ impl Scan {
         })
     }
 
-    /// Where the guide's axis was at each press.
+    /// Positions of the axis of the guide in the presses.
     fn axes_mm(&self) -> Vec<[f64; 2]> {
         let loaded = self.loaded.as_ref();
         let axes = loaded.map(|loaded| loaded.scan.presses.iter().map(|press| press.axis_m));
@@ -138,7 +139,7 @@ impl Scan {
         axes_mm.unwrap_or_else(|| vec![[0.0; 2]])
     }
 
-    /// Frames of a block with a lump, and white noise of the camera.
+    /// Simulated frames of a block with a lump, with white noise of the camera.
     fn simulated(seed: u64) -> Result<Self, ElasticityError> {
         let (specimen, guide) = simulated_block()?;
         // A hard lump of clinical size, shallow enough to be found.
@@ -167,7 +168,7 @@ impl Scan {
             .map(|(state, approach_m)| {
                 let clean: Vec<f64> = radii_m.iter().map(|r| state.pressure_at(*r)).collect();
                 let largest = clean.iter().copied().fold(0.0, f64::max);
-                // 0.75 % of the largest pressure a pixel of 86 µm, of which a ring has many.
+                // 0.75 % of the largest pressure per pixel of 86 µm, many of which form a ring.
                 let error = |radius: &f64| {
                     let pixels = std::f64::consts::TAU * radius * width / 86e-6f64.powi(2);
                     7.5e-3 * largest / pixels.sqrt()
@@ -196,7 +197,7 @@ impl Scan {
     }
 }
 
-/// The frames of all presses, their cells one press after the other.
+/// The frames of all presses, with their cells one press after the other.
 fn side_by_side(scan: &tactile_imaging::inclusion::Scan) -> Vec<PressureProfile> {
     let frames = scan.presses.iter().map(|press| press.frames.clone());
     let joined = frames.reduce(|mut joined, frames| {
@@ -209,8 +210,8 @@ fn side_by_side(scan: &tactile_imaging::inclusion::Scan) -> Vec<PressureProfile>
     joined.unwrap_or_default()
 }
 
-/// A block of tissue as high as two faces, and a guide of three layers, the stiffest towards the
-/// tissue.
+/// A block of tissue as high as two faces, and a guide of three layers with the stiffest towards
+/// the tissue.
 fn simulated_block() -> Result<(TissueBlock, Guide), ElasticityError> {
     let layer = |(thickness_m, modulus)| {
         Ok(GuideLayer {
@@ -255,7 +256,7 @@ pub(crate) fn run(arguments: &InclusionArguments, context: &mut Context) -> Resu
     let mut exit = Exit::Complete;
     let mut hidden = None;
     if let (Some(contrast), Some(loaded)) = (arguments.hidden, &scan.loaded) {
-        // What was found stands, whatever becomes of what was not.
+        // The found inclusion is valid, even if the limits cannot be computed.
         let face_m = scan.guide.radius_m();
         match Hidden::new(&search, loaded, &scan.specimen, face_m, contrast, context) {
             Ok(found) => {
@@ -264,7 +265,7 @@ pub(crate) fn run(arguments: &InclusionArguments, context: &mut Context) -> Resu
             }
             Err(ElasticityError::Cancelled) => exit = Exit::Interrupted,
             Err(error) => {
-                let text = format!("what could hide is not known: {error}");
+                let text = format!("hidden lumps could not be computed: {error}");
                 context.warn("hidden_unknown", json!({}), text);
                 exit = Exit::Partial;
             }
@@ -308,7 +309,7 @@ fn found(
     })
 }
 
-/// Prints the errors that scans of this block would leave, were the assumed lump in it.
+/// Prints the expected errors of scans of this block with the assumed lump.
 fn design(
     arguments: &InclusionArguments,
     scene: Option<&InclusionScene>,
@@ -327,7 +328,7 @@ fn design(
         youngs_modulus_pa: 1e3 * arguments.lump_kpa,
         block_modulus_pa: 1e3 * arguments.tissue_kpa,
     };
-    // Largest approaches over the block's height, and numbers of frames at even approaches.
+    // Largest approaches relative to the height of the block, and numbers of frames at equal steps.
     let scans = [0.03, 0.06, 0.1].map(|largest| [1, 2, 3].map(|frames| (largest, frames)));
     let scans = scans.concat();
     let mut bar = Bar::of(scans.len(), "comparing scans");
@@ -335,7 +336,8 @@ fn design(
     for (largest, frames) in scans {
         let step = largest * specimen.height_m() / f64::from(frames);
         let approaches: Vec<f64> = (1..=frames).map(|k| step * f64::from(k)).collect();
-        // White error of a ring's mean over the mean pressure: some thousand pixels with 1 % noise.
+        // White error of a ring mean relative to the mean pressure: about a thousand pixels with 1
+        // % noise.
         let white = vec![3e-4 * assumed.block_modulus_pa * largest; radii.len()];
         let errors = search.expected_errors(&assumed, &approaches, &radii, &white);
         rows.push((approaches, errors.map_err(|error| unusable(file, &error))?));
@@ -361,7 +363,7 @@ fn design(
         ));
     }
     context.line(
-        "above 25 % a parameter cannot be told; a contact that slips or tissue that tears is not \
+        "above 25 % a parameter is not determined; a contact that slips or tissue that tears is not \
          in the model",
     );
     let row =
@@ -393,7 +395,7 @@ fn parameter(parameter: &Identifiable, scale: f64, unit: &str) -> String {
         Identifiable::Yes(estimated) => interval(estimated, scale, unit),
         Identifiable::No(estimated) => {
             let ends = ends(estimated, scale);
-            format!("cannot be told from these frames (95 %: {ends} {unit})")
+            format!("not determined by these frames (95 %: {ends} {unit})")
         }
     }
 }
@@ -495,7 +497,7 @@ fn page(estimate: &InclusionEstimate, scan: &Scan, hidden: Option<&Hidden>) -> P
     let mut pressures = axes("Pressure on the guide's face", "pressure (Pa)");
     let mut residuals = axes("Residuals of all frames", "measured − fitted (Pa)");
     for (frame, profile) in scan.profiles.iter().enumerate() {
-        // The legend names each kind of mark once.
+        // The legend contains each kind of mark once.
         let name = |text: &'static str| if frame == 0 { text } else { "" };
         let curve = |values: &[f64]| -> Vec<[f64; 2]> {
             let pairs = estimate.radii_m.iter().zip(values);
@@ -508,7 +510,7 @@ fn page(estimate: &InclusionEstimate, scan: &Scan, hidden: Option<&Hidden>) -> P
         let rest: Vec<f64> = pairs.map(|(measured, fitted)| measured - fitted).collect();
         let plain = curve(&estimate.homogeneous_pa[frame]);
         pressures = pressures.points(curve(&profile.pressure_pa), Colour::Blue, name("measured"));
-        // Cells of a face come in no order of their distance.
+        // The cells of a face are not ordered by their distance.
         pressures = if estimate.radii_m.is_sorted() {
             pressures
                 .line(curve(fitted), Colour::Orange, name("fit"))
@@ -574,8 +576,8 @@ fn above(scan: &Scan, estimate: &InclusionEstimate) -> Panel {
     with_lumps(panel, estimate, "its place, 95 %", of_lump)
 }
 
-/// A panel with every lump and the ends of its diameter's interval. `of_lump` gives its middle and
-/// the lines of another interval, which are named.
+/// A panel with every lump and the ends of the interval of its diameter. `of_lump` gives its centre
+/// and the lines of another interval, which are named.
 fn with_lumps(
     mut panel: Panel,
     estimate: &InclusionEstimate,
@@ -583,7 +585,7 @@ fn with_lumps(
     of_lump: impl Fn(&Inclusion) -> ([f64; 2], Vec<[[f64; 2]; 2]>),
 ) -> Panel {
     for (index, inclusion) in estimate.inclusions().iter().enumerate() {
-        // The legend names each kind of line once.
+        // The legend contains each kind of line once.
         let named = |text: &'static str| if index == 0 { text } else { "" };
         let (centre, lines) = of_lump(inclusion);
         let diameter = inclusion.diameter_m.estimate();

@@ -1,5 +1,5 @@
-//! The program `tactile`: every stage of an optical tactile sensor's measurement, and the whole,
-//! from the command line.
+//! The program `tactile`: every stage of a measurement with an optical tactile sensor, and the
+//! whole measurement, from the command line.
 //!
 //! ```text
 //! cargo run --release -p tactile-cli -- measure
@@ -51,9 +51,9 @@ use text::printable;
 
 /// Force, shape, strain and Young's modulus from the frames of an optical tactile sensor.
 ///
-/// Every subcommand prints its results as text, or as one JSON object with --json, and writes files
-/// (tables as CSV, plots as SVG) to the folder given by --out and nowhere else. The examples in the
-/// help run as they stand in a copy of the repository.
+/// Every subcommand prints its results as text, or as one JSON object with --json. It writes files
+/// (tables as CSV, plots as SVG) only to the folder given by --out. The examples in the help can be
+/// run in a copy of the repository.
 #[derive(Parser)]
 #[command(name = "tactile", version, after_help = AFTER_HELP, arg_required_else_help = true)]
 struct Program {
@@ -66,8 +66,8 @@ struct Program {
     /// Write tables and plots to this folder. `calibrate` writes a sensor to this file.
     #[arg(long, global = true, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Write the answer to this file as a page for people: pictures, cautions, what was taken as
-    /// known, inputs with their hashes, and the call. It needs no network.
+    /// Write the result to this file as a page: pictures, cautions, assumptions, inputs with their
+    /// hashes, and the call. It needs no network.
     #[arg(long, global = true, value_name = "FILE.html")]
     report: Option<PathBuf>,
     /// Refuse a job that needs more memory than this, in GB.
@@ -144,8 +144,8 @@ impl Command {
 
 /// Runs the program on the arguments of this process.
 ///
-/// Reads and writes files, the standard streams and, where it can, the interrupt's handler of the
-/// process: for a `main`.
+/// Reads and writes files and the standard streams and, if possible, installs a handler for
+/// interrupts: intended for a `main`.
 ///
 /// ```no_run
 /// fn main() -> std::process::ExitCode {
@@ -156,11 +156,11 @@ pub fn run() -> ExitCode {
     ExitCode::from(run_with(std::env::args_os()))
 }
 
-/// Runs the program on arguments, of which the first is its own name, and returns its exit code as
-/// `tactile --help` lists them.
+/// Runs the program on arguments, the first of which is its name, and returns its exit code as
+/// listed by `tactile --help`.
 ///
-/// As [`run`], it takes the interrupt's handler of the process: for a program in another language
-/// that is this one.
+/// Like [`run`], it installs a handler for interrupts: intended for a program in another language
+/// that acts as this one.
 ///
 /// ```
 /// let code = tactile_cli::run_with(["tactile", "--version"]);
@@ -180,7 +180,7 @@ pub fn run_with(arguments: impl IntoIterator<Item: Into<OsString> + Clone>) -> u
     };
     let mut outputs = Outputs::new(program.out, program.memory_gb);
     outputs.report = program.report.map(|path| {
-        // What the subcommand is for, the first sentence of its help.
+        // The purpose of the subcommand: the first sentence of its help.
         let about = command
             .find_subcommand(&name)
             .and_then(clap::Command::get_about);
@@ -192,7 +192,7 @@ pub fn run_with(arguments: impl IntoIterator<Item: Into<OsString> + Clone>) -> u
     context.close(ended).code()
 }
 
-/// Prints the help where it was asked for, else the error in the arguments as one sentence.
+/// Prints the help if it was requested, otherwise the error in the arguments as one sentence.
 fn explain(error: &clap::Error) -> Exit {
     let text = error.render().to_string();
     match error.kind() {
@@ -207,7 +207,7 @@ fn explain(error: &clap::Error) -> Exit {
             Exit::Input
         }
         _ => {
-            // The first paragraph says what is wrong; usage and tips follow.
+            // The first paragraph describes the error, followed by usage and tips.
             let first = text.split("\n\n").next().unwrap_or_default();
             let words: Vec<&str> = first.split_whitespace().collect();
             let sentence = printable(&words.join(" "));

@@ -1,4 +1,4 @@
-//! `tactile light`: why an optical tactile sensor sees a press.
+//! `tactile light`: how an optical tactile sensor detects a press.
 use crate::console::{Bar, Context};
 use crate::failure::{Exit, Failure};
 use crate::plot::{Colour, Page, Panel};
@@ -11,13 +11,13 @@ use tactile_imaging::optics::{Dispersion, Geometry, Led, OpticsError, acceptance
 
 /// Trace the light of an LED through the layered waveguide, at rest and under a press
 ///
-/// Prints the acceptance angles of the paper's layers and where the light goes. --out gets
-/// light.svg: ray paths, the light towards the camera against slope and against the touching
-/// object's index, and how fast the answer settles with the number of rays.
+/// Prints the acceptance angles of the layers of the paper and the distribution of the light. --out
+/// gets light.svg: ray paths, the light towards the camera as a function of slope and of the index
+/// of the touching object, and the convergence with the number of rays.
 #[derive(Args)]
 #[command(after_help = "Example:\n  tactile light --rays 2000 --out target/light")]
 pub(crate) struct LightArguments {
-    /// Rays for each point of a curve.
+    /// Number of rays per point of a curve.
     #[arg(long, default_value_t = 8000,
           value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     rays: u32,
@@ -37,7 +37,7 @@ pub(crate) fn run(arguments: &LightArguments, context: &mut Context) -> Result<E
     Ok(Exit::Complete)
 }
 
-/// Prints the numbers and draws the page, if that is wanted.
+/// Prints the numbers and draws the page, if requested.
 fn traced(arguments: &LightArguments, context: &mut Context) -> Result<Option<Page>, OpticsError> {
     let glass = Dispersion::BOROFLOAT_33.index(530e-9)?;
     // From the object's side to the glass, §3.3.
@@ -104,7 +104,7 @@ fn dimple(depth_m: f64) -> Result<Dimple, OpticsError> {
     Dimple::new(CENTRE_M, HALF_WIDTH_M, depth_m)
 }
 
-/// A dimple of 1.5 mm touched by a white object over its inner 3 mm.
+/// A dimple of 1.5 mm in contact with a white object over its inner 3 mm.
 fn pressed(index: f64) -> Result<Touched<Dimple>, OpticsError> {
     let object = TouchingObject { index, albedo: 0.8 };
     Touched::new(dimple(1.5e-3)?, object, CENTRE_M, 3e-3)
@@ -117,7 +117,8 @@ struct Tracer<'a> {
 }
 
 impl Tracer<'_> {
-    /// Where the light goes. `profile` is filled with the share towards the camera along the slab.
+    /// Distribution of the light. `profile` is filled with the fraction towards the camera along
+    /// the slab.
     fn trace(
         &self,
         surface: &dyn TopSurface,
@@ -139,7 +140,7 @@ impl Tracer<'_> {
         Ok(100.0 * budget.camera)
     }
 
-    /// Prints where the light goes, at rest and in four presses.
+    /// Prints the distribution of the light, without load and in four presses.
     fn budgets(&self, context: &mut Context) -> Result<Value, OpticsError> {
         context.line(format_args!(
             "\nwhere the light of a 140° LED goes (% of its light, {} rays in space)",
@@ -189,7 +190,7 @@ impl Tracer<'_> {
                 &mut stays
             };
             ends.push(end);
-            // Red is the colour of the rays that leave.
+            // Red marks the rays that leave.
             panel = panel.line(line, Colour::category(if k < 3 { k } else { k + 1 }), "");
         }
         for (ends, colour, name) in [
@@ -258,7 +259,7 @@ impl Tracer<'_> {
             ),
         ];
         for (name, surface, colour) in scenes {
-            // A bin a millimetre of the slab, and rays for all of them.
+            // One bin per millimetre of the slab, and rays for all of them.
             let mut profile = [0.0; 30];
             self.trace(surface, Geometry::Volume, (4 * self.rays, 1), &mut profile)?;
             let bins = profile.iter().enumerate();
@@ -274,13 +275,13 @@ impl Tracer<'_> {
             let budget = self.trace(&surface, Geometry::Section, (rays, seed), &mut [])?;
             Ok(budget.camera)
         };
-        // Thirty-two times as many rays as the longest of the series stand in for the exact answer.
+        // Thirty-two times as many rays as the longest of the series represent the exact result.
         let best = camera(1 << 19, 99)?;
         let mut curve: Vec<[f64; 2]> = Vec::new();
         for power in 5..=14 {
             let rays = 1_u32 << power;
             let mut square = 0.0;
-            // Sixteen starts of the sequence tell the error of one.
+            // Sixteen starts of the sequence determine the error of one.
             for seed in 0..16 {
                 square += (camera(rays, seed)? / best - 1.0).powi(2);
             }

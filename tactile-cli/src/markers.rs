@@ -16,13 +16,13 @@ use tactile_imaging::gel::{MarkerField, find_markers};
 
 /// Follow the markers of a gel from a reference to frames
 ///
-/// Dark dots of one size are found in colour or grey images, also under uneven light. The matcher
-/// pairs them, whatever their order, and bears missing ones. Frames are followed one after the other,
-/// so that a grid may move by more than its step. --out gets NAME_markers.csv for every frame NAME, a
-/// row for every marker of the reference: its place and its displacement in pixels, the standard error
-/// of a coordinate of both, and whether it is seen (0: it is moved as those around it). With the gel's
-/// shear modulus and thickness the force along x and y and the torque about the markers' mean are
-/// printed.
+/// Dark dots of one size are found in colour or grey images, even under uneven light. The matcher
+/// pairs them in any order, and markers may be missing. Frames are followed one after the other, so
+/// that a grid may move by more than its pitch. --out gets NAME_markers.csv for every frame NAME,
+/// with one row for every marker of the reference: its position and its displacement in pixels, the
+/// standard errors of a coordinate of both, and whether it is visible (0: its displacement is
+/// estimated from those around it). With shear modulus and thickness of the gel, the force along x
+/// and y and the torque about the mean of the markers are printed.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -37,7 +37,7 @@ pub(crate) struct MarkersArguments {
     /// Frame before the markers moved.
     #[arg(long, value_name = "IMAGE")]
     reference: PathBuf,
-    /// The largest motion of a marker from a frame to the next, in pixels.
+    /// The largest displacement of a marker between consecutive frames, in pixels.
     #[arg(long, value_name = "PX", value_parser = positive)]
     largest_motion_px: Option<f64>,
     /// Size of a pixel on the gel in micrometres.
@@ -56,7 +56,7 @@ pub(crate) fn run(arguments: &MarkersArguments, context: &mut Context) -> Result
         frames, reference, ..
     } = arguments;
     if let Some((rows, columns)) = image_size(reference) {
-        // Grey levels as numbers, the light around them, and the passes that find the dots.
+        // Grey levels as numbers, the surrounding light, and the passes that find the dots.
         let bytes = 80.0 * rows as f64 * columns as f64;
         context.allow(bytes, "finding the markers", "give smaller images")?;
     }

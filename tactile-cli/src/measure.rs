@@ -1,4 +1,4 @@
-//! `tactile measure`: everything, of a simulated press or of a user's own frames.
+//! `tactile measure`: all results of a simulated press or of a user's frames.
 use crate::arguments::{Repetition, force_n};
 use crate::console::{Bar, Context};
 use crate::failure::{Exit, Failure};
@@ -21,13 +21,13 @@ use tactile_simulate::{PressLoad, PressOptions, PressSimulation, PressTruth, Tri
 
 /// Measure the Young's modulus of an object from frames at two or more loads
 ///
-/// Without SCENE.toml it simulates the paper's experiment (a ball of 3 mm radius pressed with 0.7 N
-/// and 1.2 N on the layered waveguide), measures the simulated frames blindly, and prints every
-/// result beside the truth. With SCENE.toml it measures your own frames. With the sensor file of a
-/// gel that is lit in colours it gives depth, contact and force of every frame, and the files of
-/// `tactile depth --sensor`. --repeat N gives the
-/// median and the 99th centile of the times of every stage and of the whole. --out gets the plots:
-/// frames.svg, surfaces.svg, matches.svg, displacement.svg, strain.svg, summary.svg.
+/// Without SCENE.toml it simulates the experiment of the paper (a ball of 3 mm radius pressed with
+/// 0.7 N and 1.2 N on the layered waveguide), measures the simulated frames, and prints every
+/// result with its true value. With SCENE.toml it measures the frames of a scene. With the sensor
+/// file of a gel under coloured light it prints depth, contact and force in every frame, and writes
+/// the files of `tactile depth --sensor`. --repeat N prints the median and the 99th centile of
+/// the times of every stage and of the whole. --out gets the plots: frames.svg, surfaces.svg,
+/// matches.svg, displacement.svg, strain.svg, summary.svg.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -58,7 +58,7 @@ SCENE.toml (paths are relative to it; colour becomes grey by the luma of Rec. 60
   layers = [{ refractive_index = 1.38, thickness_m = 2e-3, youngs_modulus_pa = 1.36e5, \
                         poisson_ratio = 0.5 }]")]
 pub(crate) struct MeasureArguments {
-    /// Scene file with your own frames. See below. Without it a press is simulated.
+    /// Scene file with your own frames (see below). Without it a press is simulated.
     #[arg(value_name = "SCENE.toml")]
     scene: Option<PathBuf>,
     #[arg(value_name = "FRAMES", requires = "scene",
@@ -78,11 +78,11 @@ pub(crate) struct MeasureArguments {
     forces: Vec<f64>,
 }
 
-/// Frames with everything that their measurement needs.
+/// Frames with all inputs of their measurement.
 enum Frames {
     /// Simulated, with the truth.
     Simulated(Box<Trial>),
-    /// A user's own.
+    /// From a scene file.
     Scene(Box<(Scene, SceneData, Exit)>),
 }
 
@@ -115,9 +115,10 @@ impl Frames {
             return Ok(Self::Scene(Box::new((scene, data, exit))));
         }
         let frames = scene.frames.len();
-        // Loading names the error of a reference that cannot be read.
+        // Loading reports the error of an unreadable reference.
         if let Some((rows, columns)) = image_size(&scene.reference) {
-            // Frames are kept up to 64 MB and read again beyond. Their results take 4 kB each.
+            // Frames of up to 64 MB are kept, and larger ones are read again. Their results take 4
+            // kB each.
             let pixels = (rows * columns) as f64;
             let bytes = pixels + (frames as f64 * pixels).min(64e6) + 4e3 * frames as f64;
             let job = format!("a scene of {frames} frames");
@@ -126,7 +127,7 @@ impl Frames {
         let data = scene.load_without_frames().map_err(Failure::input)?;
         let mut colours = Colours::Unknown;
         for SceneFrame { image, .. } in &scene.frames {
-            // Loading the frames names the error of one that cannot be read.
+            // Loading the frames reports the error of an unreadable one.
             let colour = image_colour(image).unwrap_or_default();
             colours.compare(&scene.reference, image, colour, context);
         }
@@ -151,7 +152,7 @@ impl Frames {
         }
     }
 
-    /// The pipeline's error, with file and field where there is a scene file.
+    /// The error of the pipeline, with file and field if there is a scene file.
     fn explain(&self, error: PipelineError) -> String {
         match self {
             Self::Simulated(_) => error.to_string(),
@@ -159,7 +160,7 @@ impl Frames {
         }
     }
 
-    /// Whether no stream of frames broke off.
+    /// Whether no stream of frames was truncated.
     fn all_read(&self) -> bool {
         match self {
             Self::Simulated(_) => true,
@@ -182,7 +183,7 @@ fn true_strain(truth: &[PressTruth]) -> Option<[[f64; 3]; 3]> {
     Some(std::array::from_fn(|r| std::array::from_fn(|c| e[(r, c)])))
 }
 
-/// The truth of a simulated press as JSON. The surface is the one that the pressure is read as.
+/// The truth of a simulated press as JSON. The surface is the apparent one.
 fn truth_value(simulation: &PressSimulation) -> Value {
     let frame = |t: &PressTruth| {
         json!({
@@ -207,7 +208,7 @@ struct Timing {
     centile_99_ms: f64,
 }
 
-/// The object that `--json` prints.
+/// The output of `--json`.
 #[derive(Serialize)]
 struct Answer<'a> {
     #[serde(flatten)]
@@ -218,7 +219,7 @@ struct Answer<'a> {
     timing: &'a [Timing],
 }
 
-/// The reading of a frame by the first stage, none without contact.
+/// Result of the first stage for a frame. `None` without contact.
 type Contact = Result<Option<ContactReading>, PipelineError>;
 
 pub(crate) fn run(arguments: &MeasureArguments, context: &mut Context) -> Result<Exit, Failure> {
@@ -242,7 +243,8 @@ pub(crate) fn run(arguments: &MeasureArguments, context: &mut Context) -> Result
     let frames = Frames::open(arguments, context)?;
     let pipeline = frames.pipeline(arguments.points as usize)?;
     let mut press = frames.press(&pipeline)?;
-    // The contact of a frame needs nothing of the others: these are there if Ctrl-C ends the rest.
+    // The contact of a frame is independent of the others: contacts are available even if Ctrl-C
+    // stops the rest.
     let Some(contacts) = contacts(&mut press, context) else {
         return Ok(Exit::Interrupted);
     };
@@ -258,7 +260,7 @@ pub(crate) fn run(arguments: &MeasureArguments, context: &mut Context) -> Result
         context.note(frames.explain(error.clone()));
     }
     context.keep_cautions(&measurement.flags);
-    // The cautions stand beside the measurement, as in every answer.
+    // The cautions are separate from the measurement, as in every result.
     let flags = std::mem::take(&mut measurement.flags);
     context.value(&Answer {
         measurement: &measurement,
@@ -292,7 +294,7 @@ pub(crate) fn run(arguments: &MeasureArguments, context: &mut Context) -> Result
             found.pixel_size_m.map(|m| 1e3 * m),
         );
     }
-    // A press that was simulated is drawn beside its truth.
+    // A simulated press is drawn with its truth.
     let mut lines = summary_lines(&measurement);
     if let (Some(truth), Ok(modulus)) = (truth, &measurement.youngs_modulus_pa) {
         let error = percent(modulus.value, truth.youngs_modulus_pa);
@@ -314,8 +316,7 @@ pub(crate) fn run(arguments: &MeasureArguments, context: &mut Context) -> Result
     }
 }
 
-/// The contact of every frame. After Ctrl-C those so far are printed, and there is nothing more to
-/// do.
+/// The contact of every frame. After Ctrl-C the contacts so far are printed, and the program ends.
 fn contacts(press: &mut Press<'_>, context: &mut Context) -> Option<Vec<Contact>> {
     let mut bar = Bar::of(press.frames(), "measuring contacts");
     context.interrupt.polled(true);
@@ -332,8 +333,8 @@ fn contacts(press: &mut Press<'_>, context: &mut Context) -> Option<Vec<Contact>
     Some(contacts)
 }
 
-/// Runs the long stages one by one, so that Ctrl-C ends the work between two of them. False if it
-/// did. The press keeps the answers and the errors of its stages.
+/// Runs the long stages one by one, so that Ctrl-C can stop between two of them. Returns false in
+/// that case. The press keeps the results and the errors of its stages.
 fn long_stages(press: &Press<'_>, context: &Context) -> bool {
     let mut bar = Bar::of(
         press.measured_surfaces().count() + 1,
@@ -354,7 +355,7 @@ fn long_stages(press: &Press<'_>, context: &Context) -> bool {
     !context.interrupt.requested()
 }
 
-/// The contacts alone, of a measurement that Ctrl-C stopped.
+/// Prints only the contacts, for a measurement stopped by Ctrl-C.
 fn print_contacts(contacts: &[Contact], context: &mut Context) {
     let mut values = Vec::new();
     for (k, contact) in contacts.iter().enumerate() {
@@ -384,7 +385,7 @@ fn print_contacts(contacts: &[Contact], context: &mut Context) {
     context.value(&json!({ "interrupted": true, "contacts": values }));
 }
 
-/// Measures `n` times from the frames, the reference being known. It is empty where `n` is one.
+/// Measures `n` times from the frames, with a known reference. Empty if `n` is one.
 fn timing(first: &Press<'_>, n: u32, context: &Context) -> Vec<Timing> {
     if n < 2 {
         return Vec::new();
@@ -398,7 +399,7 @@ fn timing(first: &Press<'_>, n: u32, context: &Context) -> Vec<Timing> {
         }
         let start = Instant::now();
         let press = first.renewed();
-        // A stage without an answer takes its time as well.
+        // A stage without a result takes time as well.
         let _ = press.measure();
         let whole = start.elapsed();
         for (list, stage) in times.iter_mut().zip(Stage::ALL) {

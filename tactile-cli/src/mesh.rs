@@ -1,7 +1,7 @@
-//! Faces as meshes, which other programs open.
+//! Surfaces as meshes for other programs.
 use ndarray::Array2;
 
-/// A binary PLY of square pixels. Places and depths are in millimetres, x along columns, y along
+/// A binary PLY of square pixels. Positions and depths are in millimetres, x along columns, y along
 /// rows, and z the depth into the gel.
 pub(crate) fn ply(depth_m: &Array2<f64>, pixel_size_m: f64) -> Vec<u8> {
     let (rows, columns) = depth_m.dim();
@@ -24,7 +24,7 @@ pub(crate) fn ply(depth_m: &Array2<f64>, pixel_size_m: f64) -> Vec<u8> {
         for column in 1..columns {
             let at = |r: usize, c: usize| (r * columns + c) as i32;
             file.push(4);
-            // Seen from the object, against the clock.
+            // Counterclockwise, seen from the object.
             let corners = [
                 at(row - 1, column - 1),
                 at(row - 1, column),

@@ -1,4 +1,4 @@
-//! The files of a call: named and checked before the work starts, written after the answer is
+//! The files of a call: named and checked before the computation, written after the result is
 //! printed.
 use crate::failure::Failure;
 use crate::plot::Page;
@@ -17,13 +17,13 @@ use zip::{CompressionMethod, ZipWriter};
 /// Extensions of videos and arrays, whose frames are read one by one.
 const STREAMED: [&str; 4] = ["y4m", "avi", "npy", "npz"];
 
-/// The folder of the results, if one is wanted, and the files for it.
+/// The folder of the results, if requested, and its files.
 pub(crate) struct Outputs {
     folder: Option<PathBuf>,
     limit_bytes: f64,
     planned: Vec<PathBuf>,
     ready: Vec<(PathBuf, Vec<u8>)>,
-    /// The page for people, if one is wanted.
+    /// The report page, if requested.
     pub report: Option<Report>,
 }
 
@@ -43,9 +43,9 @@ impl Outputs {
         self.folder.as_deref()
     }
 
-    /// Announces the names of the files to be written and the inputs. No result may replace an
-    /// input, also none that a scene or calibration file names, no two may have one name, the
-    /// folder must allow writing, and every input must fit into the memory that is allowed.
+    /// Registers the names of the files to be written and the inputs. A result must not replace an
+    /// input, including those listed in a scene or calibration file. No two results may have the
+    /// same name, the folder must be writable, and every input must fit into the allowed memory.
     pub(crate) fn plan(
         &mut self,
         names: &[impl AsRef<OsStr>],
@@ -64,8 +64,8 @@ impl Outputs {
         self.plan_in(&folder, names, inputs)
     }
 
-    /// Refuses a job that needs more memory than is allowed. `job` names it and its size, `remedy`
-    /// the way out.
+    /// An error if a job needs more memory than allowed. `job` is its name and size, `remedy` the
+    /// advice in the message.
     pub(crate) fn allow(&self, bytes: f64, job: &str, remedy: &str) -> Result<(), Failure> {
         let size = |bytes: f64| match bytes {
             b if b >= 1e12 => format!("{:.1} TB", b * 1e-12),
@@ -83,15 +83,15 @@ impl Outputs {
         )))
     }
 
-    /// Refuses inputs that take more memory than is allowed, before they are decoded. Returns the
-    /// files that scenes and calibrations among them name.
+    /// An error if inputs need more memory than allowed, before they are decoded. Returns the files
+    /// listed in scenes and calibrations among them.
     fn allow_inputs(&self, inputs: &[impl AsRef<Path>]) -> Result<Vec<PathBuf>, Failure> {
         let all = inputs.iter().map(AsRef::<Path>::as_ref);
         let named: Vec<PathBuf> = all.clone().flat_map(|path| named_in(path, 0)).collect();
         for path in all.chain(named.iter().map(PathBuf::as_path)) {
             let name = path.display();
             if let Some((rows, columns)) = image_size(path) {
-                // Samples as they are decoded, grey levels as numbers, and the passes over both.
+                // Decoded samples, grey levels as numbers, and the passes over both.
                 let bytes = 32.0 * rows as f64 * columns as f64;
                 let job = format!("the image {name} of {columns} × {rows} pixels");
                 self.allow(bytes, &job, "give smaller images")?;
@@ -109,12 +109,12 @@ impl Outputs {
         Ok(named)
     }
 
-    /// Whether pictures are wanted.
+    /// Whether pictures are requested.
     pub(crate) fn draws(&self) -> bool {
         self.folder.is_some() || self.report.is_some()
     }
 
-    /// Announces the page to be written. It replaces no input.
+    /// Registers the report page. It must not replace an input.
     fn plan_report(
         &mut self,
         inputs: &[impl AsRef<Path>],
@@ -130,7 +130,7 @@ impl Outputs {
         self.protect(&inputs)
     }
 
-    /// Completes the page for people.
+    /// Completes the report page.
     pub(crate) fn finish_report(&mut self) {
         if let Some(report) = self.report.take() {
             self.ready
@@ -138,7 +138,7 @@ impl Outputs {
         }
     }
 
-    /// As [`plan`](Self::plan), where `--out` names a file in this folder.
+    /// Like [`plan`](Self::plan), for an `--out` that names a file in this folder.
     pub(crate) fn plan_in(
         &mut self,
         folder: &Path,
@@ -147,10 +147,11 @@ impl Outputs {
     ) -> Result<(), Failure> {
         let named = self.allow_inputs(inputs)?;
         self.plan_report(inputs, &named)?;
-        // The folder is made with the first file, inside the nearest one that exists.
+        // The folder is created with the first file, inside the nearest existing folder.
         let nearest = folder.ancestors().find(|f| f.exists());
         let ancestor = nearest.unwrap_or(Path::new("."));
-        // Where a file can be made results can be written. It has no name and is gone at once.
+        // Results can be written if a file can be created. It has no name and is removed
+        // immediately.
         if let Err(error) = tempfile::tempfile_in(ancestor) {
             return Err(Failure::input(format!(
                 "--out {} cannot be written in {} ({error}): name another folder for the results",
@@ -176,7 +177,7 @@ impl Outputs {
         self.protect(&named)
     }
 
-    /// Refuses more inputs that one of the results would replace.
+    /// An error if a result would replace one of these further inputs.
     pub(crate) fn protect(&self, inputs: &[impl AsRef<Path>]) -> Result<(), Failure> {
         for path in &self.planned {
             let mut inputs = inputs.iter().map(AsRef::as_ref);
@@ -191,14 +192,14 @@ impl Outputs {
         Ok(())
     }
 
-    /// Adds a file, if files are wanted.
+    /// Adds a file, if files are requested.
     pub(crate) fn add(&mut self, name: impl AsRef<Path>, bytes: Vec<u8>) {
         if let Some(folder) = &self.folder {
             self.ready.push((folder.join(name), bytes));
         }
     }
 
-    /// Adds a page of plots, if files are wanted.
+    /// Adds a page of plots, if files are requested.
     pub(crate) fn page(
         &mut self,
         name: impl AsRef<Path>,
@@ -214,8 +215,8 @@ impl Outputs {
         Ok(())
     }
 
-    /// Writes the files, each whole or not at all. Results of a run that was stopped are in part:
-    /// they replace no earlier ones. Returns the paths of what was written, and of what was kept.
+    /// Writes the files, each completely or not at all. Results of an interrupted run are partial
+    /// and do not replace earlier ones. Returns the paths of the written and of the kept files.
     pub(crate) fn write(&mut self, stopped: bool) -> Result<[Vec<String>; 2], Failure> {
         let [mut written, mut kept] = [Vec::new(), Vec::new()];
         for (path, bytes) in self.ready.drain(..) {
@@ -231,7 +232,7 @@ impl Outputs {
     }
 }
 
-/// Refuses a result whose name leads out of its folder, or to what is no file.
+/// An error if the name of a result leads out of its folder, or to something that is not a file.
 fn refuse_target(path: &Path, folder: &Path) -> Result<(), Failure> {
     let refused = |what: &str| {
         Err(Failure::input(format!(
@@ -255,10 +256,10 @@ fn refuse_target(path: &Path, folder: &Path) -> Result<(), Failure> {
     }
 }
 
-/// The files that a TOML file names, and those that the TOML files among them name.
+/// The files listed in a TOML file, and those listed in the TOML files among them.
 fn named_in(path: &Path, depth: usize) -> Vec<PathBuf> {
     let toml = path.extension().is_some_and(|e| e == "toml");
-    // A scene names a sensor, and no scene or sensor is as long as a megabyte.
+    // A scene lists a sensor, and no scene or sensor is as large as a megabyte.
     if !toml
         || depth > 4
         || !path
@@ -269,7 +270,7 @@ fn named_in(path: &Path, depth: usize) -> Vec<PathBuf> {
     }
     let text = std::fs::read_to_string(path).unwrap_or_default();
     let mut names = Vec::new();
-    // A file that is no TOML is refused by its reader.
+    // A file that is not TOML is an error of its reader.
     if let Ok(table) = text.parse::<toml::Table>() {
         strings(&toml::Value::Table(table), &mut names);
     }
@@ -292,12 +293,12 @@ fn strings(value: &toml::Value, found: &mut Vec<String>) {
     }
 }
 
-/// Whether both paths lead to one file that exists.
+/// Whether both paths are the same existing file.
 fn same_file(a: &Path, b: &Path) -> bool {
     let (Ok(x), Ok(y)) = (a.metadata(), b.metadata()) else {
         return false;
     };
-    // The path alone does not show a hard link.
+    // A hard link is not visible in the path.
     identity(&x).is_some_and(|id| Some(id) == identity(&y))
         || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
@@ -321,7 +322,7 @@ pub(crate) fn beside(input: &Path, suffix: &str) -> OsString {
     name
 }
 
-/// CSV text: a header, and rows of numbers with the digits that give them back.
+/// CSV text: a header, and rows of numbers with as many digits as restore them.
 #[derive(Default)]
 pub(crate) struct Csv {
     text: String,
@@ -333,7 +334,7 @@ impl Csv {
         Self { text }
     }
 
-    /// A matrix without a header, a row a line.
+    /// A matrix without a header, one line per row.
     pub(crate) fn of_grid(values: &Array2<f64>) -> Vec<u8> {
         let mut csv = Self::default();
         values.rows().into_iter().for_each(|row| csv.row(row));
@@ -348,7 +349,7 @@ impl Csv {
     pub(crate) fn cells(&mut self, values: impl IntoIterator<Item = Option<impl Debug>>) {
         let cell = |value: Option<_>| {
             let text = value.map_or(String::new(), |value| format!("{value:?}"));
-            // A whole number is written as one.
+            // An integer is written without decimals.
             text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
         };
         let cells: Vec<String> = values.into_iter().map(cell).collect();
@@ -361,7 +362,7 @@ impl Csv {
     }
 }
 
-/// Named arrays as `numpy.load` reads them.
+/// Named arrays in the format of `numpy.load`.
 pub(crate) struct Npz {
     archive: ZipWriter<Cursor<Vec<u8>>>,
 }
@@ -372,7 +373,7 @@ impl Npz {
         Self { archive }
     }
 
-    /// Adds an array in C order. `kind` is NumPy's name of its elements, `<f8` or `<i8`.
+    /// Adds an array in C order. `kind` is NumPy's name of the element type, `<f8` or `<i8`.
     pub(crate) fn add(
         &mut self,
         name: &str,
@@ -383,7 +384,7 @@ impl Npz {
         let shape: String = shape.iter().map(|n| format!("{n}, ")).collect();
         let mut header =
             format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({shape}), }}");
-        // Data begin at a multiple of 64 bytes; ten stand before the header, a line break ends it.
+        // Data begin at a multiple of 64 bytes, after ten bytes, the header and a line break.
         let padding = 63 - (10 + header.len()) % 64;
         header.push_str(&" ".repeat(padding));
         header.push('\n');

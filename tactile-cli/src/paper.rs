@@ -19,16 +19,17 @@ use tactile_simulate::{
     PressScene, PressTruth, Trial,
 };
 
-/// Share of a punch's radius beyond which its pressure is level: at the rim it has no bound.
+/// Fraction of the radius of a punch from which its pressure is taken as constant: at the rim it is
+/// infinite.
 const LEVEL_FROM: f64 = 0.98;
 
 /// Repeat the experiments of the paper's section 5 on the simulated sensor
 ///
-/// Prints what the paper reports beside what the simulated sensor gives: the calibration with a
-/// flat tip (Fig. 9), the line through a contact's centroid (Fig. 8), the moduli of both polymers
-/// by the printed method and by the default one (Figs 10 to 12), a match of 105 to 105 points, the
-/// sensor's specification (Table 1), and the angles of total internal reflection (§3.4). The truth
-/// of the balls is by finite elements. --out gets paper.svg.
+/// Prints the values reported in the paper and those of the simulated sensor: the calibration with
+/// a flat tip (Fig. 9), the line through the centroid of a contact (Fig. 8), the moduli of both
+/// polymers by the printed method and by the default one (Figs 10 to 12), a match of 105 to 105
+/// points, the specification of the sensor (Table 1), and the angles of total internal reflection
+/// (§3.4). The truth of the balls is computed by finite elements. --out gets paper.svg.
 #[derive(Args)]
 #[command(after_help = "\
 Example:
@@ -42,10 +43,11 @@ Every part has a command of its own:
   a match of 105 to 105 points       tactile match examples/data/cases.txt
   light and angles                   tactile light")]
 pub(crate) struct PaperArguments {
-    /// Run the labelling over all candidates too. Without it, over the 12 likeliest of each point.
+    /// Also run the labelling over all candidates. Without it, only the 12 likeliest of each point
+    /// are used.
     #[arg(long)]
     dense: bool,
-    /// Seed of the camera's noise.
+    /// Seed of the camera noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
@@ -54,7 +56,7 @@ pub(crate) struct PaperArguments {
 struct Experiment {
     title: &'static str,
     key: &'static str,
-    /// What, the paper's figure, and the figure here.
+    /// Name, value of the paper, and value here.
     rows: Vec<[String; 3]>,
     panels: Vec<Panel>,
     values: Map<String, Value>,
@@ -152,7 +154,7 @@ fn flat_tip(seed: u64) -> Found<Experiment> {
         let pixels = frame.iter().zip(&reference);
         pixels.map(|(&f, &r)| f64::from(f) - f64::from(r)).sum()
     };
-    // Every reading is a frame with noise of its own. The gauge is taken as exact.
+    // Every reading is a frame with different noise. The gauge is treated as exact.
     let up = (0..forces.len()).map(|k| CalibrationPair::loading(sum(scene.frame(k, 0)), forces[k]));
     let down = (0..forces.len())
         .rev()
@@ -203,8 +205,8 @@ fn loop_percent(line: &LinearCalibration) -> f64 {
 
 /// A rigid flat punch on an elastic half-space (Boussinesq): p = F/(2πa √(a² − r²)).
 ///
-/// The pressure at the rim has no bound. It is level beyond s = 0.98 of the radius, where a share
-/// 1 − ½√(1 − s²) of the force is left, and scaled to carry all of it.
+/// The pressure at the rim is infinite. Beyond s = 0.98 of the radius, where a fraction 1 − ½√(1 −
+/// s²) of the force remains, it is constant and scaled to carry all of it.
 fn punch(force_n: f64, radius_m: f64) -> ContactState {
     let radii: Vec<f64> = (0..=100).map(|k| 1e-2 * f64::from(k) * radius_m).collect();
     let rim = |share: f64| (1.0 - share * share).sqrt();
@@ -297,7 +299,7 @@ fn fit_line(line: &[[f64; 2]], basis: Basis<'_>) -> (f64, Vec<[f64; 2]>, f64) {
         let columns = rows[0].len();
         let a = nalgebra::DMatrix::from_fn(line.len(), columns, |i, k| rows[i][k]);
         let b = nalgebra::DVector::from_iterator(line.len(), line.iter().map(|p| p[1]));
-        // A profile that covers no pixel leaves all of the line.
+        // For a profile that covers no pixel, the whole line remains.
         let c = a.clone().svd(true, true).solve(&b, 1e-12);
         let fitted = c.map_or_else(|_| b.map(|_| 0.0), |c| a * c);
         let rms = ((&fitted - &b).norm_squared() / line.len() as f64).sqrt();
@@ -423,7 +425,7 @@ fn printed_labelling() -> RelaxationLabelling {
     RelaxationLabelling::default().with_compatibility(Compatibility::Printed)
 }
 
-/// 105 control points at 0.7 N matched to where the truth moves them at 1.2 N, in another order.
+/// 105 control points at 0.7 N matched to their true positions at 1.2 N, in another order.
 fn labelling(trial: &Trial, dense: bool) -> Found<Experiment> {
     let pipeline = trial.pipeline()?;
     let press = trial.press(&pipeline.with_control_points(105))?;
@@ -536,7 +538,7 @@ fn specification(trial: &Trial) -> Found<Experiment> {
     Ok(found)
 }
 
-/// (1) to (4): within which angle each layer traps light, and whether the cone of the LED fits.
+/// (1) to (4): the angle within which each layer traps light, and whether the cone of the LED fits.
 fn light() -> Found<Experiment> {
     let indices = [1.38, 1.39, 1.40, 1.41];
     let printed = ["71.98°", "74.89°", "78.46°", "83.73°"];

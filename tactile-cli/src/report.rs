@@ -1,4 +1,4 @@
-//! Answers as pages for people: one HTML file that needs nothing else.
+//! Results as report pages: one self-contained HTML file.
 use crate::relief::HeightGrid;
 use crate::text::{four_digits, printable};
 use base64::Engine;
@@ -14,11 +14,11 @@ use tactile_files::scene::Scene;
 use tactile_imaging::core::Source;
 use tactile_imaging::pipeline::{Flag, Measurement, Object, interval_text, with_error};
 
-/// The page of a measurement: the modulus with its interval, cautions and what to do about them,
-/// where the error comes from, and all numbers.
+/// The page of a measurement: the modulus with its interval, cautions with their remedies, the
+/// error budget, and all numbers.
 ///
-/// It is one HTML file without scripts and requests. `tactile measure --report` adds pictures,
-/// what the scene states as exact, the inputs with their hashes, and the call.
+/// It is one HTML file without scripts and requests. `tactile measure --report` adds pictures, the
+/// exact values of the scene, the inputs with their hashes, and the call.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -41,20 +41,20 @@ pub fn of(measurement: &Measurement) -> String {
     report.html()
 }
 
-/// A line of what was printed.
+/// A printed line.
 enum Printed {
     Line(String),
     Row(String, String),
 }
 
-/// What a call is about, collected while it runs, and its page.
+/// The content of the report of a call, collected while it runs, and its page.
 ///
-/// The page's policy allows no request, and no script but the one that turns surfaces. Nothing on
-/// it depends on when, where or how fast the call ran, so that two pages differ only where calls or
+/// The policy of the page allows no requests, and only the script that rotates surfaces. The page
+/// does not depend on time, place or speed of the call, so that two pages differ only if calls or
 /// data do.
 pub(crate) struct Report {
     pub path: PathBuf,
-    /// The call, ready for a shell.
+    /// The call, in the syntax of a shell.
     call: String,
     question: String,
     answers: Vec<String>,
@@ -86,23 +86,23 @@ impl Report {
         }
     }
 
-    /// Adds what is printed too.
+    /// Adds a printed line.
     pub(crate) fn line(&mut self, text: &str) {
         self.printed.push(Printed::Line(text.to_owned()));
     }
 
-    /// Adds a name and its value, which are printed too.
+    /// Adds a printed name with its value.
     pub(crate) fn row(&mut self, name: &str, value: &str) {
         let row = Printed::Row(name.to_owned(), value.to_owned());
         self.printed.push(row);
     }
 
-    /// Adds a sentence to the answer at the top.
+    /// Adds a sentence to the result at the top.
     pub(crate) fn answer(&mut self, text: impl Into<String>) {
         self.answers.push(text.into());
     }
 
-    /// Adds a caution and what to do about it, which may be empty. A caution stands on the page once.
+    /// Adds a caution and its remedy, which may be empty. A caution appears on the page once.
     pub(crate) fn caution(&mut self, text: impl Into<String>, remedy: &str) {
         let caution = [text.into(), remedy.into()];
         if !self.cautions.contains(&caution) {
@@ -125,13 +125,13 @@ impl Report {
         self.tables.push((title, rows));
     }
 
-    /// Adds a picture, SVG of this program.
+    /// Adds a picture (an SVG of this program).
     pub(crate) fn picture(&mut self, svg: String) {
         self.pictures.push(svg);
     }
 
-    /// Adds heights that the mouse turns, NaN where there is no surface. Heights and pixels are in
-    /// millimetres.
+    /// Adds heights that can be rotated with the mouse, NaN outside the surface. Heights and pixels
+    /// are in millimetres.
     pub(crate) fn surface(&mut self, title: &str, heights: ArrayView2<'_, f64>, pixel: [f64; 2]) {
         let Some(relief) = HeightGrid::of(heights, pixel) else {
             return;
@@ -145,7 +145,7 @@ impl Report {
         ));
     }
 
-    /// Adds files that the answer depends on.
+    /// Adds files on which the result depends.
     pub(crate) fn inputs(&mut self, files: impl IntoIterator<Item = PathBuf>) {
         for file in files {
             if !self.inputs.contains(&file) {
@@ -154,7 +154,7 @@ impl Report {
         }
     }
 
-    /// Adds the answer of a measurement, its cautions and its error budget.
+    /// Adds the result of a measurement, its cautions and its error budget.
     pub(crate) fn measurement(&mut self, measurement: &Measurement) {
         match &measurement.youngs_modulus_pa {
             Ok(found) => {
@@ -173,7 +173,7 @@ impl Report {
         self.table("Where the error comes from", shares.collect());
     }
 
-    /// Adds what a scene states with and without an error.
+    /// Adds the values stated by a scene with and without an error.
     pub(crate) fn assumptions(&mut self, scene: &Scene) {
         let stated = |value: f64, error: Option<f64>, scale: f64, unit: &str| match error {
             Some(error) if error > 0.0 => format!("{}{unit}", with_error(value, error, scale)),
@@ -196,7 +196,7 @@ impl Report {
             let error = scene.errors.stated(Source::PoissonRatio);
             add("Poisson's ratio", stated(poisson_ratio, error, 1.0, ""));
         } else {
-            // Fields and numbers, as the scene has them.
+            // Fields and numbers, as in the scene.
             add("object", format!("{:?}, taken as exact", scene.object));
         }
         match scene.pixel_size_m {
@@ -258,7 +258,7 @@ style-src 'unsafe-inline'; img-src data:; script-src 'sha256-{allowed}'">
             }
         }
         if !self.cautions.is_empty() {
-            // A caution of every kind stands before the numbers that it is about.
+            // Cautions of every kind come before the numbers to which they apply.
             writeln!(page, "<h2>Cautions</h2>\n<ul class=\"cautions\">")?;
             for [text, remedy] in &self.cautions {
                 let (text, remedy) = (escaped(text), escaped(remedy));
@@ -301,7 +301,7 @@ style-src 'unsafe-inline'; img-src data:; script-src 'sha256-{allowed}'">
         writeln!(page, "<p>tactile {version}</p>\n</body>\n</html>")
     }
 
-    /// All that was printed: rows as tables, lines as they stand.
+    /// All printed output: rows as tables, lines unchanged.
     fn write_printed(&self, page: &mut String) -> std::fmt::Result {
         writeln!(page, "<h2>All numbers</h2>")?;
         let mut open = "";
@@ -337,7 +337,7 @@ fn row(page: &mut String, name: &str, value: &str) -> std::fmt::Result {
 /// Kinds of cautions with their remedies: the tables of the guide.
 const CAUTIONS: &str = include_str!("../cautions.md");
 
-/// What to do about a caution of a kind, by the guide; empty for a kind that it does not list.
+/// The remedy for a kind of caution in the guide. Empty if the guide does not list the kind.
 fn remedy(kind: &str) -> &'static str {
     let row = CAUTIONS.lines().find(|line| {
         let cell = line.strip_prefix("| `").and_then(|row| row.split_once('`'));
@@ -347,8 +347,8 @@ fn remedy(kind: &str) -> &'static str {
     cells.map_or("", |(_, remedy)| remedy)
 }
 
-/// The kind of a caution of the library, by which the guide lists it. That of an assumption is the
-/// kind of its warning.
+/// The kind of a caution of the library, as listed in the guide. For an assumption it is the kind
+/// of its warning.
 fn kind(flag: &Flag) -> String {
     let name = match flag {
         Flag::Assumption { warning } => json!(warning),
@@ -360,7 +360,7 @@ fn kind(flag: &Flag) -> String {
     }
 }
 
-/// The SHA-256 of a file, or why there is none.
+/// The SHA-256 of a file, or the reason why there is none.
 fn hash(path: &Path) -> String {
     let hashed = || -> std::io::Result<String> {
         if !path.is_file() {
@@ -380,7 +380,7 @@ fn hash(path: &Path) -> String {
     hashed().unwrap_or_else(|error| format!("cannot be read: {error}"))
 }
 
-/// Text of others as HTML.
+/// Foreign text as HTML.
 fn escaped(text: &str) -> String {
     let lines: Vec<String> = text.split('\n').map(printable).collect();
     lines
@@ -392,7 +392,7 @@ fn escaped(text: &str) -> String {
         .replace('\'', "&#39;")
 }
 
-/// A word of a command for a shell.
+/// A word of a command in the syntax of a shell.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c);
     if !word.is_empty() && word.chars().all(plain) {

@@ -1,4 +1,4 @@
-//! `tactile stream --serve`: the measurement as it runs, on a page for browsers.
+//! `tactile stream --serve`: the running measurement, on a page for browsers.
 use crate::failure::Failure;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -12,20 +12,21 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tiny_http::{Header, Method, Request, Response, Server};
 
-/// Most browsers that look at once. Each has a thread.
+/// Maximum number of browsers at once. Each has a thread.
 const MOST_VIEWERS: usize = 32;
 
-/// Time between two pictures: an eye sees no more, and a picture is most of an event's bytes.
+/// Time between two pictures. A picture is most of an event, and more pictures would not be
+/// visible.
 const BETWEEN_PICTURES: Duration = Duration::from_millis(50);
 
-/// Time between two surfaces and states of the sensor, which take more of the measurement's time
-/// than a picture does: full frames (1392 × 1042) lose less than 5 % of their rate.
+/// Time between two surfaces and states of the sensor, which delay the measurement more than a
+/// picture: full frames (1392 × 1042) lose less than 5 % of their rate.
 const BETWEEN_SURFACES: Duration = Duration::from_millis(500);
 
-/// Columns of a picture, at most. A phone has no more room for it.
+/// Maximum number of columns of a picture, enough for a phone.
 const PICTURE_COLUMNS: usize = 480;
 
-/// The last frame's answer, which a later one replaces whether it was seen or not.
+/// The result of the last frame, which is replaced by the next, viewed or not.
 #[derive(Default)]
 struct Latest {
     number: u64,
@@ -49,7 +50,7 @@ impl Shared {
         self.changed.notify_all();
     }
 
-    /// The next event after those numbers, as soon as there is one. None at the end.
+    /// The next event after those numbers, as soon as there is one. `None` at the end.
     fn next(&self, seen: &mut [u64; 3]) -> Option<Value> {
         let latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
         let waits = |latest: &mut Latest| latest.number == seen[0] && !latest.ended;
@@ -71,26 +72,26 @@ impl Shared {
     }
 }
 
-/// A server of the page. It never holds up the measurement: viewers get the latest answer, and
-/// those between are dropped.
+/// A server of the page. It never delays the measurement: viewers get the latest result, and
+/// intermediate ones are dropped.
 pub(crate) struct LivePage {
     shared: Arc<Shared>,
-    /// When a picture and a surface were shown last.
+    /// Times of the last picture and the last surface.
     shown: [Option<Instant>; 2],
-    /// Where a browser finds the page.
+    /// Address of the page for a browser.
     pub url: String,
 }
 
 impl LivePage {
-    /// Listens on an address. One that other computers reach needs the token in the page's
-    /// address.
+    /// Listens on an address. If other computers can reach it, the address of the page contains a
+    /// token.
     pub(crate) fn serve(address: SocketAddr) -> Result<Self, Failure> {
         let refused = |error: Box<dyn Error + Send + Sync>| {
             Failure::input(format!("cannot serve on {address}: {error}"))
         };
         let listener = TcpListener::bind(address).map_err(|error| refused(error.into()))?;
-        // Connections inherit the option. Without it the end of a large event waits some 40 ms
-        // until the browser acknowledges the rest.
+        // Connections inherit the option. Without it, the end of a large event would wait about 40
+        // ms until the browser acknowledges the rest.
         #[cfg(unix)]
         rustix::net::sockopt::set_tcp_nodelay(&listener, true).map_err(Failure::output)?;
         let server = Server::from_listener(listener, None).map_err(refused)?;
@@ -121,8 +122,8 @@ impl LivePage {
         Ok(page)
     }
 
-    /// Shows the numbers of a frame of one or three channels, `[row, column, channel]`, and its
-    /// picture and its surface where the last ones are old enough and somebody looks.
+    /// Shows the numbers of a frame of one or three channels, `[row, column, channel]`. Its picture
+    /// and its surface are added if the last ones are old enough and there is a viewer.
     pub(crate) fn show(
         &mut self,
         numbers: Value,
@@ -171,7 +172,7 @@ fn picture(frame: ArrayView3<'_, u8>) -> Value {
 impl Drop for LivePage {
     fn drop(&mut self) {
         self.shared.update(|latest| latest.ended = true);
-        // Viewers get the last answer before the program ends and closes their connections.
+        // Viewers get the last result before the program ends and closes their connections.
         let start = Instant::now();
         while self.shared.viewers.load(Ordering::Relaxed) > 0 && start.elapsed().as_millis() < 200 {
             std::thread::sleep(Duration::from_millis(5));
@@ -179,7 +180,7 @@ impl Drop for LivePage {
     }
 }
 
-/// Answers with the page or with events. No path leads to a file.
+/// Responds with the page or with events. No path leads to a file.
 fn answer(request: Request, query: &str, shared: &Arc<Shared>) {
     let header = |name: &'static str| {
         let mut headers = request.headers().iter();
@@ -188,7 +189,8 @@ fn answer(request: Request, query: &str, shared: &Arc<Shared>) {
     };
     let page = format!("/{query}");
     let events = format!("/events{query}");
-    // A page of another site may lead its own name to this address, but no number.
+    // A page of another site may resolve its own name to this address, but cannot forge a numeric
+    // host.
     let status = if !is_address(header("Host")) {
         403
     } else if *request.method() != Method::Get {
@@ -196,12 +198,12 @@ fn answer(request: Request, query: &str, shared: &Arc<Shared>) {
     } else if request.url() == page {
         200
     } else if request.url() != events {
-        // A wrong token is not told from a wrong path.
+        // A wrong token gives the same response as a wrong path.
         404
     } else if shared.viewers.fetch_add(1, Ordering::Relaxed) < MOST_VIEWERS {
         let shared = Arc::clone(shared);
         std::thread::spawn(move || {
-            // A viewer that leaves ends the writing.
+            // Writing ends when a viewer leaves.
             let _ = send_events(request, &shared);
             shared.viewers.fetch_sub(1, Ordering::Relaxed);
         });
@@ -220,11 +222,11 @@ fn answer(request: Request, query: &str, shared: &Arc<Shared>) {
             response.add_header(header);
         }
     }
-    // Nothing can be done for a viewer that has left.
+    // A viewer that has left is ignored.
     let _ = request.respond(response);
 }
 
-/// Whether a `Host` is a number or this computer, with or without a port.
+/// Whether a `Host` is a numeric address or this computer, with or without a port.
 fn is_address(host: &str) -> bool {
     let with_port = host.rsplit_once(':');
     let with_port = with_port.filter(|(_, port)| port.parse::<u16>().is_ok());
@@ -260,7 +262,7 @@ fn send_events(request: Request, shared: &Shared) -> std::io::Result<()> {
 
 const PAGE: &str = include_str!("serve.html");
 
-/// Takes the place of its name in the page.
+/// Replaces its name in the page.
 const RELIEF: &str = include_str!("relief.js");
 
 #[cfg(test)]

@@ -9,25 +9,25 @@ use tactile_simulate::{
     Trial,
 };
 
-/// The ball and the camera.
+/// Options of the ball and the camera.
 #[derive(Args)]
 pub(crate) struct Simulation {
-    /// Simulation: the ball's material.
+    /// Simulation: material of the ball.
     #[arg(long, value_enum, default_value_t = Polymer::Cl2000x, conflicts_with = "scene")]
     polymer: Polymer,
-    /// Simulation: the ball's Young's modulus in kPa, instead of a polymer's.
+    /// Simulation: Young's modulus of the ball in kPa, instead of that of a polymer.
     #[arg(long, value_name = "KPA", value_parser = modulus_kpa,
           conflicts_with_all = ["scene", "polymer"])]
     modulus_kpa: Option<f64>,
-    /// Simulation: the ball's radius in mm.
+    /// Simulation: radius of the ball in mm.
     #[arg(long, value_name = "MM", default_value_t = 3.0, value_parser = length_mm,
           conflicts_with = "scene")]
     radius_mm: f64,
-    /// Simulation: where the contacts come from (finite elements in measure, Hertz in stream).
-    /// Finite elements are there for the two polymers, 3 mm, up to 1.3 N.
+    /// Simulation: model of the contacts (default: finite elements in measure, Hertz in stream).
+    /// Finite elements exist for the two polymers with 3 mm, up to 1.3 N.
     #[arg(long, value_enum, conflicts_with = "scene")]
     physics: Option<Physics>,
-    /// Simulation: seed of the camera's noise.
+    /// Simulation: seed of the camera noise.
     #[arg(
         long,
         default_value_t = 1,
@@ -43,13 +43,13 @@ pub(crate) struct Simulation {
 /// The law of the simulated contacts.
 #[derive(Clone, Copy, ValueEnum)]
 pub(crate) enum Physics {
-    /// Finite elements at finite strain, on the layers. Read by the default estimator.
+    /// Finite elements at finite strain, on the layers. Evaluated by the default estimator.
     FiniteElements,
-    /// Hertz with the layers in series. Read by the same law.
+    /// Hertz with the layers in series. Evaluated by the same law.
     Hertz,
 }
 
-/// The paper's two polymers.
+/// The two polymers of the paper.
 #[derive(Clone, Copy, ValueEnum)]
 enum Polymer {
     /// Versaflex CL2000X, 103 kPa.
@@ -59,7 +59,8 @@ enum Polymer {
 }
 
 impl Simulation {
-    /// The press as it is asked for, with the default's loads. `physics` is the law if no other is.
+    /// The requested press, with the default loads. `physics` is the model if no other is
+    /// requested.
     pub(crate) fn options(&self, physics: Physics) -> PressOptions {
         let polymer = match self.polymer {
             Polymer::Cl2000x => Elastic::CL2000X,
@@ -112,7 +113,8 @@ impl Simulation {
             };
             Failure::input(format!("the press cannot be simulated: {error}{hint}"))
         })?;
-        // A contact that reaches beyond the corners leaves the camera nothing of the sensor to see.
+        // If the contact reaches beyond the corners, the camera sees no part of the sensor without
+        // contact.
         let camera = trial.scene.options().camera;
         let [rows, columns] = camera.shape.map(|pixels| pixels as f64);
         let [width, height] = camera.pixel_size_m;

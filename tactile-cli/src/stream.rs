@@ -32,14 +32,15 @@ use tactile_simulate::{LoadCycle, PressLoad, PressOptions, Trial};
 
 /// Measure frame after frame: force, contact and modulus live
 ///
-/// Without SCENE.toml a loading–unloading series is simulated and played at camera rate: frames are
-/// made beforehand, so that only the measuring is timed. A frame is late if its answer comes after
-/// the next frame is due. The exit code is then 1 if more frames came late than allowed or the
-/// modulus ends outside the tolerance. With SCENE.toml (see `tactile measure`), which describes
-/// sensor and object, recorded frames are measured one after the other, as fast as they can be. One
-/// is late if that takes longer than a frame at --rate lasts. --out gets stream.csv, a row a frame.
-/// With --json each frame is a line as it comes, and the last line is the answer (JSON Lines).
-/// In place of the scene goes the sensor file of a gel that is lit in colours, with its frames:
+/// Without SCENE.toml a loading–unloading series is simulated and played at camera rate. Its frames
+/// are computed in advance, so that only the measurement is timed. A frame is late if its result is
+/// available only after the next frame is due. The exit code is 1 if more frames were late than
+/// allowed or if the final modulus is outside the tolerance. With SCENE.toml (see
+/// `tactile measure`), which describes sensor and object, recorded frames are measured one after
+/// the other, as fast as possible. A frame is then late if its measurement takes longer than the
+/// duration of a frame at --rate. --out gets stream.csv, with one row per frame. With --json each
+/// frame is a line when it is measured, and the last line is the whole result (JSON Lines). Instead
+/// of the scene, the sensor file of a gel under coloured light may be given with its frames, for
 /// force, contact and depth.
 #[derive(Args)]
 #[command(after_help = "\
@@ -58,32 +59,32 @@ A camera or a video, by a pipe (ffmpeg has names for the cameras of every system
 
 `-` works in the same way in measure, force and depth.")]
 pub(crate) struct StreamArguments {
-    /// Scene file of the sensor and the object, whose recorded frames are measured.
+    /// Scene file of the sensor and the object, for measuring recorded frames.
     #[arg(value_name = "SCENE.toml")]
     scene: Option<PathBuf>,
     #[arg(value_name = "FRAMES", requires = "scene",
           help = frames_help("Recorded frames, or folders of them in the order of their names"))]
     frames: Vec<PathBuf>,
-    /// Frames per second: those that a video states, or 80.
+    /// Frames per second: by default those stated by a video, or 80.
     #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
     rate: Option<f64>,
     /// Largest force in newtons (1.5 in a simulation).
     #[arg(long, value_name = "N", value_parser = force_n)]
     force: Option<f64>,
-    /// Measure strain too, in frames of at least a third of the largest force, counted from the
+    /// Also measure strain, in frames of at least a third of the largest force, relative to the
     /// first of them.
     #[arg(long)]
     strain: bool,
-    /// Share of frames in per cent that may come late.
+    /// Percentage of frames that may be late.
     #[arg(long, value_name = "PERCENT", default_value_t = 0.0, value_parser = not_negative)]
     allowed_late: f64,
-    /// Record the frames as they come to this file, and their answers beside it as FILE.csv. The
-    /// file gives the same answers again: a video, or PPM images one after the other where the
-    /// gel is lit in colours.
+    /// Record the frames to this file, and their results next to it as FILE.csv. The recorded file
+    /// gives the same results again. It is a video, or a sequence of PPM images for a gel under
+    /// coloured light.
     #[arg(long, value_name = "FILE.y4m")]
     record: Option<PathBuf>,
-    /// Show frame, force, modulus, and surface in browsers as they come. An
-    /// address that other computers reach gets a token.
+    /// Show frame, force, modulus and surface live in browsers. An address that is reachable from
+    /// other computers gets a token.
     #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1,
           default_missing_value = "127.0.0.1:8642")]
     serve: Option<SocketAddr>,
@@ -93,21 +94,21 @@ pub(crate) struct StreamArguments {
     series: Series,
 }
 
-/// The loads of the series that is simulated where no scene is given.
+/// The loads of the series that is simulated without a scene.
 #[derive(Args)]
 struct Series {
-    /// Simulation: seconds of one load and unload.
+    /// Simulation: duration of one load and unload in seconds.
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = positive,
           conflicts_with = "scene")]
     period: f64,
-    /// Simulation: cycles.
+    /// Simulation: number of cycles.
     #[arg(long, value_name = "N", default_value_t = 1,
           value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "scene")]
     cycles: u32,
     /// Simulation: frames of 1392 × 1042 pixels instead of 348 × 260.
     #[arg(long, conflicts_with = "scene")]
     full_size: bool,
-    /// Simulation: error of the modulus in per cent beyond which the run fails.
+    /// Simulation: error of the modulus in per cent above which the run fails.
     #[arg(long, value_name = "PERCENT", default_value_t = 3.0, value_parser = positive,
           conflicts_with = "scene")]
     tolerance: f64,
@@ -137,7 +138,7 @@ struct Row {
     centre_px: Option<[f64; 2]>,
 }
 
-/// A modulus as JSON has it.
+/// A modulus in the format of JSON.
 #[derive(Clone, Copy, Serialize)]
 struct Modulus {
     value: f64,
@@ -159,7 +160,7 @@ impl From<&ModulusEstimate> for Modulus {
 /// A session with its cautions.
 struct Live {
     session: Session,
-    /// One of every kind, of the frame where it came first.
+    /// One caution of every kind, for the frame of its first occurrence.
     cautions: Vec<Flag>,
     /// Strain is measured in frames of at least this force.
     strained_above_n: Option<f64>,
@@ -175,8 +176,8 @@ impl Live {
         }
     }
 
-    /// Mean strain along x and z. It is none in the frame that strain is counted from, and where
-    /// the match has too few points.
+    /// Mean strain along x and z. `None` in the reference frame of the strain, and if the match has
+    /// too few points.
     fn strain(&mut self) -> Result<Option<[f64; 2]>, PipelineError> {
         match self.session.strain() {
             Ok(found) => Ok(found.map(|s| [(0, 0), (2, 2)].map(|at| s.strain.summary.mean[at]))),
@@ -272,7 +273,7 @@ impl Meter for Live {
             return json!({});
         };
         let name = match found.apparent {
-            true => "apparent surface (the pressure, read as shading)",
+            true => "apparent surface (the pressure interpreted as shading)",
             false => "surface",
         };
         let size = found.pixel_size_m.map(|m| 1e3 * m);
@@ -281,8 +282,8 @@ impl Meter for Live {
     }
 }
 
-/// Prints the results of the whole series, simulated where the true modulus is known, and adds its
-/// table to the files.
+/// Prints the results of the whole series, which is simulated if the true modulus is known, and
+/// adds its table to the files.
 fn finish(
     mut live: Watch<Live>,
     truth_pa: Option<f64>,
@@ -396,7 +397,7 @@ fn recorded(
     Ok(if unusable > 0 { Exit::Partial } else { exit })
 }
 
-/// Largest force of a simulation where none is given.
+/// Largest force of a simulation by default.
 const SIMULATED_FORCE_N: f64 = 1.5;
 
 /// Plays a simulated loading–unloading series at camera rate.
@@ -444,7 +445,7 @@ fn simulated(arguments: &StreamArguments, context: &mut Context) -> Result<Exit,
 /// Times in seconds and frames.
 type Recording = Vec<(f64, Array2<u8>)>;
 
-/// Makes all frames of the loading and unloading. Ctrl-C leaves those that are made.
+/// Computes all frames of the loading and unloading. After Ctrl-C the frames so far remain.
 fn record(trial: &Trial, cycle: LoadCycle, context: &Context) -> Result<Recording, Failure> {
     let source = trial.scene.stream(cycle);
     let mut source = source
@@ -462,7 +463,7 @@ fn record(trial: &Trial, cycle: LoadCycle, context: &Context) -> Result<Recordin
     Ok(frames)
 }
 
-/// Gives every frame to the session when it is due.
+/// Passes every frame to the session when it is due.
 fn play(
     live: &mut Watch<Live>,
     frames: &[(f64, Array2<u8>)],
@@ -473,7 +474,7 @@ fn play(
         return Ok(());
     };
     let period = Duration::from_secs_f64(1.0 / rate_hz);
-    // Buffers get their size before the clock starts.
+    // Buffers are allocated before the clock starts.
     live.meter
         .session
         .push(first.view())
@@ -485,7 +486,7 @@ fn play(
             break;
         }
         let due = Duration::from_secs_f64(*time_s);
-        // A camera would deliver the frame now.
+        // A camera would deliver the frame at this time.
         std::thread::sleep(due.saturating_sub(start.elapsed()));
         live.counts.seen += 1;
         live.take(*time_s, frame)?;

@@ -15,7 +15,7 @@ use tactile_imaging::sfs::{
     SurfaceWorkspace, slopes as slopes_of,
 };
 
-/// The domain with a mask and known heights, where there are some.
+/// The domain with a mask and known heights, if there are any.
 fn within<'a>(
     mut domain: Domain<'a, f64>,
     mask: &'a Option<Array2<bool>>,
@@ -32,10 +32,10 @@ fn within<'a>(
 
 /// Integrate slopes to heights
 ///
-/// P holds the slopes ∂z/∂x (along a row) and Q ∂z/∂y (down the rows), as matrices of the image's
-/// shape (CSV without a header, NPY, NPZ, MAT). P alone is a normal map: an image of 8 or 16 bits, or
-/// an array of shape (rows, columns, 3). The mean height is 0 unless heights are known. --out gets
-/// heights.csv and heights.svg.
+/// P contains the slopes ∂z/∂x (along a row) and Q the slopes ∂z/∂y (down the rows), as matrices of
+/// the shape of the image (CSV without a header, NPY, NPZ, MAT). P alone is a normal map: an image
+/// of 8 or 16 bits, or an array of shape (rows, columns, 3). The mean height is 0 unless heights
+/// are known. --out gets heights.csv and heights.svg.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -49,7 +49,7 @@ pub(crate) struct IntegrateArguments {
     p: PathBuf,
     /// Slopes along y.
     q: Option<PathBuf>,
-    /// How to integrate.
+    /// Method of integration.
     #[arg(long, value_enum)]
     method: Option<Integration>,
     #[command(flatten)]
@@ -96,11 +96,11 @@ pub(crate) fn integrate(
         .any(|(p, q)| p.is_finite() && q.is_finite())
     {
         return Err(Failure::input(format!(
-            "no pixel of {} has both slopes: heights cannot be told",
+            "no pixel of {} has both slopes: heights are undetermined",
             path.display()
         )));
     }
-    // The cosine transform takes whole rectangles of numbers alone.
+    // The cosine transform needs complete rectangles of numbers.
     let finite = p.iter().chain(&q).all(|slope| slope.is_finite());
     let whole = mask.is_none() && known.is_none() && finite;
     let method = arguments.method.unwrap_or(if whole {
@@ -124,7 +124,7 @@ pub(crate) fn integrate(
     }
     allow(context, p.dim(), "integrating")?;
     let domain = Domain::new(*pixel_size).map_err(Failure::input)?;
-    // No heights where there are no slopes.
+    // No heights at pixels without slopes.
     let sloped = Zip::from(&p)
         .and(&q)
         .map_collect(|p, q| p.is_finite() || q.is_finite());
@@ -201,9 +201,9 @@ fn slope_rms(surface: &Surface<f64>, p: &Array2<f64>, q: &Array2<f64>, size: [f6
     (sum / f64::from(count.max(1))).sqrt()
 }
 
-/// Refuses images whose buffers do not fit into memory.
+/// An error if the buffers of images do not fit into memory.
 fn allow(context: &Context, (rows, columns): (usize, usize), job: &str) -> Result<(), Failure> {
-    // Inputs, heights, and the buffers of the slowest method take about 200 bytes a pixel.
+    // Inputs, heights, and the buffers of the slowest method take about 200 bytes per pixel.
     context.allow(
         200.0 * rows as f64 * columns as f64,
         &format!("{job} {rows} × {columns} pixels"),
@@ -211,7 +211,7 @@ fn allow(context: &Context, (rows, columns): (usize, usize), job: &str) -> Resul
     )
 }
 
-/// Shows the progress of iterative solves and lets Ctrl-C end them with the heights so far.
+/// Shows the progress of iterative solutions. Ctrl-C stops them with the heights so far.
 fn watch(workspace: &mut SurfaceWorkspace<f64>, context: &Context, job: &'static str) {
     let interrupt = context.interrupt.clone();
     let mut bar: Option<Bar> = None;
@@ -223,7 +223,7 @@ fn watch(workspace: &mut SurfaceWorkspace<f64>, context: &Context, job: &'static
     });
 }
 
-/// Lowest and highest value in a unit of which one is `1 / scale`, in words.
+/// Lowest and highest value in a unit with 1 unit = `1 / scale`, in words.
 pub(crate) fn span(values: &Array2<f64>, scale: f64, unit: &str) -> String {
     let finite = || values.iter().copied().filter(|v| v.is_finite());
     let pixels = finite().count();

@@ -1,4 +1,5 @@
-//! `tactile table`: the contacts of a ball with a sensor's guide, computed once by finite elements.
+//! `tactile table`: the contacts of a ball with the guide of a sensor, computed once by finite
+//! elements.
 use crate::arguments::{modulus_kpa, positive};
 use crate::console::{Bar, Context};
 use crate::failure::{Exit, Failure};
@@ -11,10 +12,10 @@ use tactile_imaging::fem::ContactTableOptions;
 
 /// Compute the contact table of a ball and a waveguide
 ///
-/// SCENE.toml is a scene file, or one with its tables `object` (a sphere) and `waveguide` alone.
-/// The table holds force over contact radius and modulus, by finite elements at finite strain.
-/// `contact_table = "table.toml"` in a scene file makes the modulus follow from it. --out gets
-/// table.toml. Ctrl-C stops without a table.
+/// SCENE.toml is a scene file, or a file with only its tables `object` (a sphere) and `waveguide`.
+/// The contact table contains force as a function of contact radius and modulus, by finite elements
+/// at finite strain. With `contact_table = "table.toml"` in a scene file, it is used for the
+/// modulus. --out gets table.toml. Ctrl-C stops without a table.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  tactile table examples/data/press/scene.toml --moduli 2 \
@@ -32,7 +33,7 @@ pub(crate) struct ContactTableArguments {
     /// Number of moduli.
     #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u16).range(2..=100))]
     moduli: u16,
-    /// Largest contact radius over the ball's.
+    /// Largest contact radius relative to the radius of the ball.
     #[arg(long, value_name = "RATIO", default_value = "1.25", value_parser = positive)]
     largest_ratio: f64,
 }

@@ -1,12 +1,12 @@
-//! Numbers and the text of others, as terminals and pictures show them.
+//! Numbers and foreign text in the format of terminals and pictures.
 use tactile_imaging::core::Estimate;
 use tactile_imaging::pipeline::with_error;
 
-/// Text of others for terminals and pictures: control characters and marks that turn the direction
-/// of writing are replaced.
+/// Foreign text for terminals and pictures: control characters and marks for the direction of
+/// writing are replaced.
 ///
-/// Without this a file's name could clear the screen, forge a line of the answer, or make an SVG
-/// file unreadable.
+/// Without this a file name could clear the screen, forge a line of the result, or make an SVG file
+/// unreadable.
 pub(crate) fn printable(text: &str) -> String {
     let hidden = |c: char| {
         c.is_control()
@@ -17,12 +17,12 @@ pub(crate) fn printable(text: &str) -> String {
     text.chars().map(seen).collect()
 }
 
-/// Four significant digits, for numbers whose error is not known.
+/// Four significant digits, for numbers of unknown error.
 pub(crate) fn four_digits(value: f64) -> String {
     digits(value, 4)
 }
 
-/// A number of significant digits, plain where the value is neither tiny nor huge.
+/// A number with significant digits, without an exponent unless the value is very small or large.
 pub(crate) fn digits(value: f64, significant: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
@@ -36,7 +36,7 @@ pub(crate) fn digits(value: f64, significant: usize) -> String {
     }
 }
 
-/// A value with its standard error in a unit of which one is `1 / scale`.
+/// A value with its standard error in a unit with 1 unit = `1 / scale`.
 pub(crate) fn in_unit(estimate: Estimate, scale: f64) -> String {
     with_error(estimate.value, estimate.standard_error, scale)
 }

@@ -16,10 +16,11 @@ use tactile_imaging::tps::{
 
 /// Fit a thin-plate spline to pairs of points and warp other points by it
 ///
-/// The files are CSV, a point a row: columns x, y and, in space, z, found by name where there is a
-/// header. Row i of TARGETS is where row i of SOURCES goes. λ weighs the bending energy wᵀKw
-/// against the squared distances to the targets; 0 passes through every target. --out gets
-/// warped.csv: fx, fy (and fz) and the Jacobian dfx_dx,dfx_dy,… at every query.
+/// The files are CSV with one point per row: columns x, y and, in space, z, identified by name if
+/// there is a header. Row i of TARGETS is the image of row i of SOURCES. λ is the weight of the
+/// bending energy wᵀKw relative to the squared distances to the targets; with 0 the spline passes
+/// through every target. --out gets warped.csv: fx, fy (and fz) and the Jacobian dfx_dx,dfx_dy,… at
+/// every query.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -28,9 +29,9 @@ Examples:
   tactile warp examples/data/sources.csv examples/data/targets.csv examples/data/queries.csv \
                         --kernel r --out target/warp")]
 pub(crate) struct WarpArguments {
-    /// Where points are.
+    /// Source points.
     sources: PathBuf,
-    /// Where they go.
+    /// Target points.
     targets: PathBuf,
     /// Points to warp.
     queries: PathBuf,
@@ -38,7 +39,7 @@ pub(crate) struct WarpArguments {
     /// −r (the thin plate of space).
     #[arg(long, value_enum)]
     kernel: Option<KernelName>,
-    /// Smoothing parameter, a number of at least zero, or gcv for the one of least generalised
+    /// Smoothing parameter: a number of at least zero, or gcv for the minimum of generalised
     /// cross-validation.
     #[arg(long, value_name = "X|gcv", default_value = "0", value_parser = smoothing,
           allow_negative_numbers = true)]
@@ -72,8 +73,8 @@ fn smoothing(text: &str) -> Result<Smoothing, String> {
     }
 }
 
-/// Residual of an iterative fit, relative to the largest target: below it the digits of a CSV file
-/// hardly change.
+/// Residual of an iterative fit, relative to the largest target, below which the digits of a CSV
+/// file hardly change.
 const TOLERANCE: f64 = 1e-10;
 
 pub(crate) fn run(arguments: &WarpArguments, context: &mut Context) -> Result<Exit, Failure> {
@@ -121,8 +122,8 @@ fn with_kernel<const D: usize>(
     context: &mut Context,
     sets: Sets<'_, D>,
 ) -> Result<Exit, Failure> {
-    // In space the gradient of −r has cusps, and r³ is nearer to smooth maps by a factor of three to
-    // five (`cargo bench -p tactile-benches --bench work_precision`).
+    // In space the gradient of −r has cusps, and r³ is closer to smooth maps by a factor of three
+    // to five (`cargo bench -p tactile-benches --bench work_precision`).
     let usual = if D == 2 {
         KernelName::R2logr
     } else {
@@ -142,7 +143,7 @@ fn warp<const D: usize, K: Kernel>(
     sets: Sets<'_, D>,
 ) -> Result<Exit, Failure> {
     let [sources, targets, queries] = sets;
-    // Cross-validation is direct whatever the number of points: it takes the eigenvalues of a dense
+    // Cross-validation is direct for any number of points: it needs the eigenvalues of a dense
     // matrix.
     if matches!(arguments.lambda, Smoothing::Gcv) {
         let n = sources.len() as f64;
@@ -169,7 +170,7 @@ fn warp<const D: usize, K: Kernel>(
     })?;
     let [fit_ms, evaluate_ms] = [fit_times, evaluate_times].map(median_ms);
     let report = &spline.report;
-    // As much work as a step of the iteration, which after Ctrl-C nobody waits for.
+    // As much work as a step of the iteration, and not needed after Ctrl-C.
     let bending_energy = (!context.interrupt.requested()).then(|| {
         let _clock = Bar::clock("computing the bending energy");
         spline.bending_energy()
@@ -233,8 +234,8 @@ fn warp<const D: usize, K: Kernel>(
     Ok(Exit::complete_if(report.converged()))
 }
 
-/// The spline. Thousands of points are solved for by iteration, which Ctrl-C ends with the spline
-/// so far.
+/// The spline. Thousands of points are solved for by iteration. Ctrl-C stops it with the spline so
+/// far.
 fn fit<const D: usize, K: Kernel>(
     context: &Context,
     sources: &[Point<f64, D>],
@@ -249,7 +250,7 @@ fn fit<const D: usize, K: Kernel>(
     let mut iterating: Option<Bar> = None;
     let mut first = None;
     let spline = ThinPlateSpline::fit_watched(sources, targets, options, |progress| {
-        // From here on Ctrl-C is looked at; before, it ends the program.
+        // From here on Ctrl-C is polled; before, it ends the program.
         interrupt.polled(true);
         clock = None;
         match progress.residual {
@@ -259,8 +260,8 @@ fn fit<const D: usize, K: Kernel>(
             Some(residual) => {
                 let first = *first.get_or_insert(residual);
                 preparing = None;
-                // Conjugate gradients gain about as many digits in every step, so digits are what
-                // is counted.
+                // Conjugate gradients gain about as many digits in every step, so the progress is
+                // counted in digits.
                 let part = (first / residual).ln() / (first / TOLERANCE).ln();
                 iterating
                     .get_or_insert_with(|| Bar::of(1000, format!("{job}: iterating")))
@@ -273,7 +274,7 @@ fn fit<const D: usize, K: Kernel>(
     spline
 }
 
-/// Values and Jacobians at the queries. After Ctrl-C it is the number of those done.
+/// Values and Jacobians at the queries. After Ctrl-C, the number of completed queries.
 fn evaluate<const D: usize, K: Kernel>(
     context: &Context,
     spline: &ThinPlateSpline<D, K>,
@@ -285,7 +286,7 @@ fn evaluate<const D: usize, K: Kernel>(
     interrupt.polled(true);
     let job = format!("warping {}", count(queries.len(), "point"));
     let mut bar = Bar::of(queries.len(), job);
-    // 2^26 kernels take about a second: as long as Ctrl-C may wait.
+    // 2^26 kernels take about a second, the longest delay after Ctrl-C.
     let run = ((1 << 26) / spline.report.points.max(1)).max(1);
     let mut done = 0;
     let parts = queries.chunks(run).zip(values.chunks_mut(run));
@@ -302,7 +303,7 @@ fn evaluate<const D: usize, K: Kernel>(
     Ok(done)
 }
 
-/// The error with the file it is about.
+/// The error with its file.
 fn in_files(arguments: &WarpArguments, error: TpsError) -> String {
     let sources = arguments.sources.display();
     let targets = arguments.targets.display();

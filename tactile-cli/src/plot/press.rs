@@ -138,7 +138,7 @@ fn surfaces_page(press: &mut Press<'_>) -> Result<Page, PlotError> {
         let origin = surface.origin_m.map(|o| 1e3 * o);
         let heights = known_heights_mm(surface);
         if surface.apparent {
-            heading = "Apparent surfaces: the pressure, read as shading";
+            heading = "Apparent surfaces: the pressure interpreted as shading";
         }
         let map = HeatMap::of_pixels(heights.view(), size, "height (mm)").origin(origin);
         let panel = axes(title.clone()).heat_map(map);

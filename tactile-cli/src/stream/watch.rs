@@ -1,4 +1,4 @@
-//! The frames of a stream one after the other: from images, folders, videos and pipes.
+//! The frames of a stream in their order: from images, folders, videos and pipes.
 use super::StreamArguments;
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
@@ -11,29 +11,29 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// What measures the frames of a stream.
+/// Measures the frames of a stream.
 pub(super) trait Meter {
-    /// Frames as it takes them.
+    /// Type of its frames.
     type Frame: Pixels;
-    /// The answer of a frame.
+    /// Result of a frame.
     type Row;
 
-    /// What stands above the lines, and in a table above the cells.
+    /// Heading above the lines, and in a table above the cells.
     fn heading(&self) -> String;
     const COLUMNS: &'static str;
 
     fn measure(&mut self, frame: &Self::Frame) -> Result<Self::Row, Box<dyn Error>>;
 
-    /// The answer as cells of a table, the unknown ones empty.
+    /// The result as cells of a table. Unknown cells are empty.
     fn cells(row: &Self::Row) -> Vec<Option<f64>>;
 
-    /// The answer as a line between the frame's time and the share that came late.
+    /// The result as a line between the time of the frame and the percentage of late frames.
     fn line(row: &Self::Row, time_s: f64, late_percent: f64) -> String;
 
-    /// The answer as JSON has it.
+    /// The result in the format of JSON.
     fn update(row: &Self::Row) -> Value;
 
-    /// The answer for browsers. A frame has this many columns.
+    /// The result for browsers. A frame has this number of columns.
     fn shown(&self, row: &Self::Row, columns: f64) -> Value;
 
     /// The surface in the last frame, for browsers.
@@ -70,7 +70,7 @@ impl<M: Meter> Watch<M> {
         })
     }
 
-    /// Measures a frame, shows and records it. Returns how long the measuring and showing took.
+    /// Measures, shows and records a frame. Returns the duration of measuring and showing.
     pub(super) fn take(&mut self, time_s: f64, frame: &M::Frame) -> Result<Duration, Failure> {
         let FrameCounts { seen, late, .. } = self.counts;
         if let Some(recording) = &mut self.recording {
@@ -95,7 +95,7 @@ impl<M: Meter> Watch<M> {
         Ok(took)
     }
 
-    /// A row a frame. The first one comes with the names of the columns.
+    /// One row per frame. The first has the names of the columns.
     fn table(rows: &[(f64, M::Row)], with_names: bool) -> Vec<u8> {
         let mut csv = match with_names {
             true => Csv::new(&format!("time_s,{}", M::COLUMNS)),
@@ -107,7 +107,7 @@ impl<M: Meter> Watch<M> {
         csv.into_bytes()
     }
 
-    /// Prints the last frame: in JSON always, as text one out of sixteen of a long series.
+    /// Prints the last frame: always in JSON, and as text every sixteenth of a long series.
     pub(super) fn print_last(&self, every_one: bool, context: &mut Context) {
         let Some((time_s, row)) = self.rows.last() else {
             return;
@@ -124,15 +124,15 @@ impl<M: Meter> Watch<M> {
         }
     }
 
-    /// What the answer has whatever is measured.
+    /// The common fields of the result.
     pub(super) fn value(&self) -> Value {
         json!({
             "frames": self.rows.len(), "rate_hz": self.counts.rate_hz, "late": self.counts.late,
         })
     }
 
-    /// Adds the table of the series to the files. Complete if no more frames came late than allowed
-    /// in per cent.
+    /// Adds the table of the series to the files. Complete if the percentage of late frames does
+    /// not exceed the allowed one.
     pub(super) fn close(&self, allowed_late: f64, context: &mut Context) -> Exit {
         context
             .outputs
@@ -151,11 +151,11 @@ impl<M: Meter> Watch<M> {
 #[derive(Clone, Copy)]
 pub(super) struct FrameCounts {
     pub rate_hz: f64,
-    /// The number of frames that came, measured or not.
+    /// Number of frames, measured or not.
     pub seen: usize,
-    /// Those, and the files, that could not be measured.
+    /// Number of frames and files that could not be measured.
     pub unusable: usize,
-    /// Those whose answer came after the next one was due.
+    /// Number of frames whose result came after the next frame was due.
     pub late: usize,
 }
 
@@ -173,7 +173,7 @@ impl FrameCounts {
         100.0 * self.late as f64 / measured.max(1) as f64
     }
 
-    /// Prints how many came late.
+    /// Prints the number of late frames.
     pub(super) fn print(&self, measured: usize, context: &mut Context) {
         let (rate, late, percent) = (self.rate_hz, self.late, self.late_percent(measured));
         context.line(format_args!(
@@ -182,8 +182,8 @@ impl FrameCounts {
     }
 }
 
-/// Measures the frames of these files as they come. A file that breaks off or cannot be read is a
-/// caution, and the next one follows.
+/// Measures the frames of these files in their order. A file that is truncated or unreadable gives
+/// a caution, and the next one follows.
 pub(super) fn watch<M: Meter>(
     watch: &mut Watch<M>,
     frames: &[PathBuf],
@@ -192,14 +192,15 @@ pub(super) fn watch<M: Meter>(
     context: &mut Context,
 ) -> Result<(), Failure> {
     context.line(watch.meter.heading());
-    // The clock of a recording is the number in its frames' names, where they have one.
+    // The times of a recording follow from the numbers in the names of its frames, if there are
+    // any.
     let numbers = numbers(frames);
     let last = numbers.as_deref().and_then(<[_]>::last);
     let missing = last.map_or(0, |&last| last + 1 - frames.len() as u64);
     let mut before = 0;
     let unreadable = reading.each::<M::Frame>(frames, context, |frame, context| {
         if frame.number == 1 {
-            // A file that could not be read counts as one frame.
+            // An unreadable file counts as one frame.
             before = match &numbers {
                 Some(numbers) => numbers[frame.file] as usize,
                 None => watch.counts.seen.max(frame.file),
@@ -208,7 +209,7 @@ pub(super) fn watch<M: Meter>(
         let stated = rate_hz.or(frame.rate_hz);
         let rate_hz = stated.unwrap_or(watch.counts.rate_hz);
         watch.counts.rate_hz = rate_hz;
-        // Frames that the recorder dropped have their time, too.
+        // Frames dropped by the recorder take their time, too.
         watch.counts.seen = before + frame.place;
         let time_s = (watch.counts.seen - 1) as f64 / rate_hz;
         // Reading the file is not part of the measurement.
@@ -217,8 +218,8 @@ pub(super) fn watch<M: Meter>(
                 watch.counts.late += usize::from(took.as_secs_f64() > 1.0 / rate_hz);
                 watch.print_last(watch.rows.len() <= 32, context);
             }
-            // A frame without an answer does not end a stream, and thousands of them are one
-            // trouble.
+            // A frame without a result does not end a stream, and thousands of them give one
+            // caution.
             Err(failure) if failure.exit == Exit::Partial => {
                 watch.counts.unusable += 1;
                 let frame_number = watch.counts.seen;
@@ -253,8 +254,8 @@ pub(super) fn watch<M: Meter>(
     Ok(())
 }
 
-/// The numbers at the end of the frames' names, less the first one. `None` where a name has none or
-/// they do not rise.
+/// The numbers at the end of the names of the frames, relative to the first. `None` if a name has
+/// no number or if they do not increase.
 fn numbers(frames: &[PathBuf]) -> Option<Vec<u64>> {
     let number = |path: &PathBuf| -> Option<u64> {
         let stem = path.file_stem()?.to_str()?;
@@ -263,14 +264,15 @@ fn numbers(frames: &[PathBuf]) -> Option<Vec<u64>> {
     };
     let numbers = frames.iter().map(number).collect::<Option<Vec<u64>>>()?;
     let first = *numbers.first()?;
-    // More than a tenth missing is a way of naming (times, dates), not a gap.
+    // If more than a tenth is missing, the numbers are a naming scheme (times, dates) rather than
+    // gaps.
     let last = numbers.last()?.checked_sub(first)?;
     let few_gaps = last < frames.len() as u64 + (frames.len() as u64 / 10).max(2);
     let rising = numbers.windows(2).all(|pair| pair[0] < pair[1]);
     (rising && few_gaps).then(|| numbers.iter().map(|n| n - first).collect())
 }
 
-/// The images that are named, and those of the folders that are named in the order of their names.
+/// The given images, and those of the given folders in the order of their names.
 pub(crate) fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut frames = Vec::new();
     for path in paths {
@@ -303,7 +305,7 @@ fn is_image(path: &Path) -> bool {
     ["png", "pgm", "ppm", "jpg", "jpeg", "tif", "tiff"].contains(&extension.as_str())
 }
 
-/// The parts of a file's name, numbers by their value: frame_2 comes before frame_10.
+/// The parts of a file name, with numbers by their value: frame_2 comes before frame_10.
 fn natural(path: &Path) -> Vec<(u64, String)> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let mut parts: Vec<(u64, String)> = vec![(0, String::new())];
