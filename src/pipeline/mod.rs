@@ -16,15 +16,16 @@
 //! A [`Session`] follows a stream from a [`FrameSource`] with constant memory. It computes force,
 //! modulus and, on request, strain. [`contacts`] reads a batch of frames.
 //!
-//! # Which modulus For a ball, Hertz's pressure p₀√(1 − r²/a²) interpreted as frontal Lambertian
-//! shading is a hemisphere of radius a, and a grows as (F R/E*)^⅓. Between two loads this surface
-//! scales by (F₂/F₁)^⅓ for any modulus. The ratio of stress to strain, equation (31), is therefore
-//! reported (first in [`Measurement::estimators`]) but not used. The modulus comes from a³ =
-//! 3FR/(4E*), where both bodies are elastic and the layers of the waveguide act in series. Every
-//! report contains a/R, and above 0.3 the result has a flag. Equation (31) is exact for specimens
-//! with a flat face: stress over strain, regressed over all loads, with the strain from the growth
-//! of the face's area. An object of unknown shape is treated in this way if its contacts are those
-//! of a flat face. Otherwise it is rejected, and the error explains what to specify
+//! # Which modulus
+//! For a ball, Hertz's pressure p₀√(1 − r²/a²) interpreted as frontal Lambertian shading is a
+//! hemisphere of radius a, and a grows as (F R/E*)^⅓. Between two loads this surface scales by
+//! (F₂/F₁)^⅓ for any modulus. The ratio of stress to strain, equation (31), is therefore reported
+//! (first in [`Measurement::estimators`]) but not used. The modulus comes from a³ = 3FR/(4E*),
+//! where both bodies are elastic and the layers of the waveguide act in series. Every report
+//! contains a/R, and above 0.3 the result has a flag. Equation (31) is exact for specimens with a
+//! flat face: stress over strain, regressed over all loads, with the strain from the growth of the
+//! face's area. An object of unknown shape is treated in this way if its contacts are those of a
+//! flat face. Otherwise it is rejected, and the error explains what to specify
 //! ([`PipelineError::NotUniaxial`]).
 mod assumptions;
 mod batch;

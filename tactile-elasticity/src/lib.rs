@@ -9,7 +9,8 @@
 //! N. N. Lebedev & Ia. S. Ufliand, J. Appl. Math. Mech. 22 (1958) 442. T. Ogita, S. M. Rump &
 //! S. Oishi, SIAM J. Sci. Comput. 26 (2005) 1955.
 //!
-//! # Equations $F = I + H$ is the deformation gradient, $H = \nabla u$.
+//! # Equations
+//! $F = I + H$ is the deformation gradient, $H = \nabla u$.
 //! $1/E^{\ast} = (1 - \nu_1^2)/E_1 + (1 - \nu_2^2)/E_2$. Equation numbers refer to the paper.
 //!
 //! - Green–Lagrange (25)–(30):

@@ -1,9 +1,10 @@
 #![doc = include_str!("../README.md")]
 //!
-//! # Conventions Images are indexed `[row, column]`: x is the column, y the row, and (0, 0) is the
-//! centre of the first pixel. Physical quantities are in SI units, with the unit in their names.
-//! Names that end in `_px` are in pixels. Equation numbers refer to the paper on waveguide tactile
-//! imaging that the workspace follows.
+//! # Conventions
+//! Images are indexed `[row, column]`: x is the column, y the row, and (0, 0) is the centre of the
+//! first pixel. Physical quantities are in SI units, with the unit in their names. Names that end
+//! in `_px` are in pixels. Equation numbers refer to the paper on waveguide tactile imaging that
+//! the workspace follows.
 //!
 //! # Modules
 //! | module | contents |
@@ -18,8 +19,9 @@
 //! | `shear` | (9) to (12) |
 //! | `lens` | pixels to metres: sizes along x and y, radial distortion, fit to a dot target |
 //!
-//! # Equations $d$ is the grey-level difference frame − reference, $V = \sum d$ the integrated
-//! pixel value. Equation numbers refer to the paper.
+//! # Equations
+//! $d$ is the grey-level difference frame − reference, $V = \sum d$ the integrated pixel value.
+//! Equation numbers refer to the paper.
 //!
 //! - Stress and force (5), (6): $P = f(I)$ and $F_z = \int P dS$, that is $F_z = F(V)$ by
 //!   calibration.

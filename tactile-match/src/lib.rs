@@ -8,8 +8,9 @@
 //! a thin-plate spline (21)–(24), is [`RelaxationLabelling`]:
 //! `RelaxationLabelling::default().match_points(&model, &target)`.
 //!
-//! # Equations Match matrix $M$ of I model points $y_i$ and J target points $t_j$, with slack.
-//! Equation numbers refer to the paper.
+//! # Equations
+//! Match matrix $M$ of I model points $y_i$ and J target points $t_j$, with slack. Equation numbers
+//! refer to the paper.
 //!
 //! - Rows and columns sum to one with their slack: $\sum_j M_{ij} = 1$ and $\sum_i M_{ij} = 1$.
 //! - Soft assignment at the temperature $\sigma$: $M_{ij} \propto \exp(-|y_i - t_j|^2/2\sigma^2)$,

@@ -19,8 +19,9 @@
 //! are counted from the object to the glass, and their indices increase in this order, as in §3.3:
 //! 1.38, 1.39, 1.40, glass 1.41. The crate neither allocates nor needs the standard library.
 //!
-//! # Equations Equation numbers refer to the paper. $n_i$ is the index of a layer, $n_0$ that of
-//! the ambient, and $\theta$ an angle of incidence.
+//! # Equations
+//! Equation numbers refer to the paper. $n_i$ is the index of a layer, $n_0$ that of the ambient,
+//! and $\theta$ an angle of incidence.
 //!
 //! - Critical angle, and acceptance angle of light that enters through the edge (1)–(4):
 //!   $\theta_c = \arcsin(n_0/n_i)$, $\theta_i = \arcsin(\sqrt{n_i^2 - n_0^2}/n_0)$. O(1) per layer.
