@@ -113,7 +113,7 @@ impl Context {
     pub(crate) fn warn(&mut self, kind: &str, numbers: Value, sentence: impl Display) {
         let sentence = sentence.to_string();
         if let Some(report) = &mut self.outputs.report {
-            report.caution_of(kind, &sentence);
+            report.caution(&sentence, kind);
         }
         self.aside(format_args!("{:<18}{sentence}", "caution"));
         let mut caution = json!({ "kind": kind, "text": sentence });

@@ -26,7 +26,7 @@ mod photometric;
 mod plot;
 mod record;
 mod relief;
-pub mod report;
+mod report;
 mod serve;
 mod simulation;
 mod slopes;

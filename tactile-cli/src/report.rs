@@ -14,33 +14,6 @@ use tactile_files::scene::Scene;
 use tactile_imaging::core::Source;
 use tactile_imaging::pipeline::{Flag, Measurement, Object, interval_text, with_error};
 
-/// The page of a measurement: the modulus with its interval, cautions with their remedies, the
-/// error budget, and all numbers.
-///
-/// It is one HTML file without scripts and requests. `tactile measure --report` adds pictures, the
-/// exact values of the scene, the inputs with their hashes, and the call.
-///
-/// ```
-/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// # use tactile_simulate::{CalibrationRun, Camera, PressOptions, Trial};
-/// # let camera = Camera::default().coarser(8);
-/// # let trial = Trial::new(PressOptions { camera, ..Default::default() }, &CalibrationRun::default())?;
-/// let pipeline = trial.pipeline()?;
-/// let measurement = trial.press(&pipeline)?.measure();
-/// let page = tactile_cli::report::of(&measurement);
-/// assert!(page.starts_with("<!DOCTYPE html>") && page.contains("with 95 % confidence"));
-/// # Ok(()) }
-/// ```
-#[must_use]
-pub fn of(measurement: &Measurement) -> String {
-    let question = "Young's modulus of an object from frames of a tactile sensor";
-    let mut report = Report::new(PathBuf::new(), &[], question.to_owned());
-    report.measurement(measurement);
-    measurement.flags.iter().for_each(|flag| report.flag(flag));
-    report.line(&measurement.to_string());
-    report.html()
-}
-
 /// A printed line.
 enum Printed {
     Line(String),
@@ -102,22 +75,18 @@ impl Report {
         self.answers.push(text.into());
     }
 
-    /// Adds a caution and its remedy, which may be empty. A caution appears on the page once.
-    pub(crate) fn caution(&mut self, text: impl Into<String>, remedy: &str) {
-        let caution = [text.into(), remedy.into()];
+    /// Adds a caution with the remedy of its kind, which is empty for what the guide does not list. A
+    /// caution appears on the page once.
+    pub(crate) fn caution(&mut self, text: impl Into<String>, kind: &str) {
+        let caution = [text.into(), remedy(kind).to_owned()];
         if !self.cautions.contains(&caution) {
             self.cautions.push(caution);
         }
     }
 
-    /// Adds a caution of a kind.
-    pub(crate) fn caution_of(&mut self, kind: &str, text: &str) {
-        self.caution(text, remedy(kind));
-    }
-
     /// Adds a caution of the library.
     pub(crate) fn flag(&mut self, flag: &Flag) {
-        self.caution(flag.to_string(), remedy(&kind(flag)));
+        self.caution(flag.to_string(), &kind(flag));
     }
 
     /// Adds a table of names and values.
@@ -453,7 +422,7 @@ mod tests {
         report.inputs([PathBuf::from(&name)]);
         let page = report.html();
         assert!(!page.contains("<script") && !page.contains('\u{202e}'));
-        assert_eq!(page.matches("&lt;script&gt;").count(), 12);
+        assert_eq!(page.matches("&lt;script&gt;").count(), 11);
         assert!(page.contains("content=\"default-src 'none';"));
     }
 
