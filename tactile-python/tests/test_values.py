@@ -203,6 +203,7 @@ def test_splines_of_a_line_and_of_complex_values(kernel):
     ours = ti.ThinPlateSpline(line, values, kernel=kernel)
     # A system of condition below 1e6 in double precision.
     assert np.abs(ours(queries) - expected).max() < 1e-9 * np.abs(expected).max() and ours.flags == []
+    assert np.array_equal(pickle.loads(pickle.dumps(ours))(queries), ours(queries))
     sources, grid = points(30), np.stack([points(20)] * 3)
     targets = points(30, seed=5)[:, :1, None] + 1j * np.random.default_rng(6).random((30, 2, 3))
     expected = RBFInterpolator(sources, targets, kernel=kernel, degree=1)(grid.reshape(-1, 2)).reshape(3, 20, 2, 3)
