@@ -189,7 +189,7 @@ impl Reading<'_> {
             let ended = match self.open(path) {
                 Ok(mut source) => {
                     let ended = read(&mut source)?;
-                    if ended.is_ok() {
+                    if number > 0 {
                         unreadable += passed_over(path, &source, context);
                     }
                     ended
@@ -206,10 +206,12 @@ impl Reading<'_> {
             bar.done(file + 1);
         }
         context.interrupt.polled(false);
-        match failures.into_iter().next() {
-            Some(failure) => Err(failure),
-            None => Ok(unreadable),
-        }
+        let mut failures = failures.into_iter();
+        let Some(first) = failures.next() else {
+            return Ok(unreadable);
+        };
+        failures.for_each(|failure| context.caution(failure));
+        Err(first)
     }
 
     /// All frames of these files, and how many files and frames could not be read.

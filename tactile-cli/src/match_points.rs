@@ -9,7 +9,9 @@ use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::io::Write as _;
 use std::path::PathBuf;
-use tactile_files::io::{CasePoints, MatchCase, PointTable, read_cases, write_case_result};
+use tactile_files::io::{
+    CasePoints, MatchCase, PointTable, read_bytes, read_cases, write_case_result,
+};
 use tactile_imaging::PairsDoubt;
 use tactile_imaging::matching::{
     AnnealedSoftassign, CoherentPointDrift, FittedTransformation, Judgement, LinearAssignment,
@@ -19,8 +21,7 @@ use tactile_imaging::matching::{
 
 /// Match the points of two sets, in the plane or in space
 ///
-/// Two tables of points (columns x, y and z if there is one) are one case. Any other file is a case
-/// file.
+/// Two tables of points (columns x, y and z if there is one) are one case.
 ///
 /// A case file holds one or more cases: a line `case NAME D n_model n_target`, then rows `m` (a
 /// model point) and `t` (a target point) with D coordinates. The answers go to --out, a file for
@@ -192,7 +193,7 @@ pub(crate) fn run(arguments: &MatchArguments, context: &mut Context) -> Result<E
         ));
     }
     let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_owned();
-    let tables = are_tables(&arguments.cases);
+    let tables = are_tables(&arguments.cases)?;
     let mut names: Vec<OsString> = arguments.cases.iter().map(name).collect();
     if tables {
         names = vec![OsString::from(TABLES_ANSWER)];
@@ -364,15 +365,16 @@ fn parameters<const D: usize>(found: &FittedTransformation<D>) -> Value {
 /// The file of answers of two tables.
 const TABLES_ANSWER: &str = "match.txt";
 
-/// Whether these are two tables of points: their names end as tables' do.
-fn are_tables(paths: &[PathBuf]) -> bool {
-    let is_table = |path: &PathBuf| {
-        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-        ["csv", "tsv", "pts", "fcsv", "npy", "npz", "mat"]
-            .iter()
-            .any(|kind| extension == *kind)
-    };
-    paths.len() == 2 && paths.iter().all(is_table)
+/// Whether these are two tables of points: neither has the line that a case begins with.
+fn are_tables(paths: &[PathBuf]) -> Result<bool, Failure> {
+    for path in paths {
+        let bytes = read_bytes(path)?;
+        let mut lines = bytes.split(|byte| *byte == b'\n');
+        if lines.any(|line| line.trim_ascii_start().starts_with(b"case ")) {
+            return Ok(false);
+        }
+    }
+    Ok(paths.len() == 2)
 }
 
 /// One case of two tables.

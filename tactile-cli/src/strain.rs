@@ -207,8 +207,7 @@ fn answer<const D: usize>(
         series::follow(&frames, unit, arguments, context)
     } else {
         let (after, before) = (frames.remove(1), frames.remove(0));
-        let strain = if known { of_known_pairs } else { between };
-        strain(before, after, unit, arguments, context)?
+        between(before, after, known, unit, arguments, context)?
     };
     let Some(mut report) = measured else {
         return Ok(Exit::Interrupted);
@@ -275,79 +274,48 @@ struct StrainReport<const D: usize> {
     unit: &'static str,
 }
 
-/// The strain between two frames. None after Ctrl-C.
+/// The strain between two frames, of pairs that are known row by row or matched. None after Ctrl-C.
 fn between<const D: usize>(
-    Frame {
-        name: first,
-        points: before,
-        ..
-    }: Frame<D>,
-    Frame {
-        name: second,
-        points: after,
-        ..
-    }: Frame<D>,
+    before: Frame<D>,
+    after: Frame<D>,
+    known: bool,
     unit: &'static str,
     arguments: &StrainArguments,
     context: &mut Context,
 ) -> Result<Option<StrainReport<D>>, Failure> {
-    let matcher = arguments.expectations.matcher();
-    let job = format!("matching {} to {} points", before.len(), after.len());
-    let sets = (before.clone(), after.clone());
-    let Some(matching) = context.wait(job, move || matcher.match_points(&sets.0, &sets.1)) else {
-        return Ok(None);
+    let ([first, second], [before, after]) =
+        ([before.name, after.name], [before.points, after.points]);
+    let mut matching = None;
+    let matched: Vec<(usize, usize)> = if known {
+        if before.len() != after.len() {
+            let (rows, others) = (count(before.len(), "row"), after.len());
+            return Err(Failure::input(format!(
+                "{first} has {rows} and {second} {others}: with --paired row i of one file is \
+                 row i of the other"
+            )));
+        }
+        let finite = |p: &Point<f64, D>| p.iter().all(|x| x.is_finite());
+        let rows = 0..before.len();
+        let known = rows.filter(|&i| finite(&before[i]) && finite(&after[i]));
+        known.map(|i| (i, i)).collect()
+    } else {
+        let matcher = arguments.expectations.matcher();
+        let job = format!("matching {} to {} points", before.len(), after.len());
+        let sets = (before.clone(), after.clone());
+        let Some(found) = context.wait(job, move || matcher.match_points(&sets.0, &sets.1)) else {
+            return Ok(None);
+        };
+        let found = found.map_err(|error| {
+            Failure::input(format!("{first} and {second} cannot be matched: {error}"))
+        })?;
+        let pairs = found.assignment.iter().enumerate();
+        let pairs = pairs.filter_map(|(i, j)| j.map(|j| (i, j))).collect();
+        matching = Some(found);
+        pairs
     };
-    let matching = matching.map_err(|error| {
-        Failure::input(format!("{first} and {second} cannot be matched: {error}"))
-    })?;
-    let partner = |(i, j): (usize, &Option<usize>)| j.map(|j| (i, j));
-    let assignment = matching.assignment.iter().enumerate();
-    let matched: Vec<_> = assignment.filter_map(partner).collect();
-    let job = format!("fitting {} pairs", matched.len());
-    let (from, to, options) = (before.clone(), after.clone(), arguments.options());
-    // Ctrl-C during the fit leaves the pairs, which took the longest.
-    let found = context.wait(job, move || {
-        StrainBetween::of_matching(&from, &to, &matching, &options)
-            .map_err(|error| error.to_string())
-    });
-    Ok(Some(StrainReport {
-        before,
-        after,
-        matched,
-        strain: found.unwrap_or_else(|| Err("stopped by Ctrl-C".to_owned())),
-        ..StrainReport::new(unit, arguments)
-    }))
-}
-
-/// The strain of pairs that are known, row by row. None after Ctrl-C.
-fn of_known_pairs<const D: usize>(
-    Frame {
-        name: first,
-        points: before,
-        ..
-    }: Frame<D>,
-    Frame {
-        name: second,
-        points: after,
-        ..
-    }: Frame<D>,
-    unit: &'static str,
-    arguments: &StrainArguments,
-    context: &mut Context,
-) -> Result<Option<StrainReport<D>>, Failure> {
-    if before.len() != after.len() {
-        let (rows, others) = (count(before.len(), "row"), after.len());
-        return Err(Failure::input(format!(
-            "{first} has {rows} and {second} {others}: with --paired row i of one file is row i of \
-             the other"
-        )));
-    }
-    let finite = |p: &Point<f64, D>| p.iter().all(|x| x.is_finite());
-    let rows = 0..before.len();
-    let known = rows.filter(|&i| finite(&before[i]) && finite(&after[i]));
-    let matched: Vec<_> = known.map(|i| (i, i)).collect();
-    let skipped = before.len() - matched.len();
-    if skipped > 0 {
+    if let skipped @ 1.. = before.len() - matched.len()
+        && known
+    {
         context.warn(
             "skipped_rows",
             json!({ "rows": skipped }),
@@ -356,8 +324,13 @@ fn of_known_pairs<const D: usize>(
     }
     let job = format!("fitting {} pairs", matched.len());
     let (from, to, options) = (before.clone(), after.clone(), arguments.options());
+    // Ctrl-C during the fit leaves the pairs, which took the longest.
     let found = context.wait(job, move || {
-        StrainBetween::of_known_pairs(&from, &to, &options).map_err(|error| error.to_string())
+        let found = match &matching {
+            Some(matching) => StrainBetween::of_matching(&from, &to, matching, &options),
+            None => StrainBetween::of_known_pairs(&from, &to, &options),
+        };
+        found.map_err(|error| error.to_string())
     });
     Ok(Some(StrainReport {
         before,
