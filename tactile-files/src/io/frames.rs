@@ -58,7 +58,8 @@ const MOST_NAMED: usize = 10;
 /// As a [`FrameSource`] it gives grey frames. [`next_colour_frame`](Self::next_colour_frame) gives
 /// those of a gel that is lit in colours.
 ///
-/// Memory is that of one frame, but for TIFF and other images, which are read whole.
+/// Memory is that of one frame, but for TIFF, other images and an array of an archive, which are read
+/// whole, the latter to 512 MiB.
 ///
 /// ```
 /// use ndarray::{Array2, array};
