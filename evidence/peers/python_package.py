@@ -59,8 +59,8 @@ def matches(random, pycpd, rustcpd):
     programs = {"ours": lambda: ti.match_points(model, target)}
     if pycpd:
         programs["pycpd"] = lambda: pycpd.DeformableRegistration(X=target, Y=model).register()
-    if rustcpd and hasattr(rustcpd, "DeformableRegistration"):
-        programs["rustcpd"] = lambda: rustcpd.DeformableRegistration(X=target, Y=model).register()
+    if rustcpd:
+        programs["rustcpd"] = lambda: rustcpd.register_deformable(model, target, parallel=False)
     race("match of 500 points", programs, rounds=3)
 
 
