@@ -346,6 +346,10 @@ impl StressCalibration for PressureCurve {
     }
 }
 
+/// Degrees of freedom that the residuals of a curve must have. Exact forces leave no residual on a
+/// curve that follows every frame, and its standard error would then be that of a known curve.
+const LEAST_FREEDOM: f64 = 2.0;
+
 /// Number of knots. Twelve intervals represent powers from 0.8 to 1.2 within 10⁻³ of the force.
 /// Further knots would be determined by the prior alone.
 const KNOTS: usize = 13;
@@ -571,13 +575,17 @@ impl Problem {
             }
             (squares / count as f64).sqrt()
         };
-        // From a curve that follows every frame to one whose slope is a parabola in the root of the
-        // grey level.
+        // From a curve whose slope is a parabola in the root of the grey level to one that follows
+        // every frame.
         let mut best = (0.0, f64::INFINITY);
-        for smoothness in [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0, 1000.0] {
+        for smoothness in [1000.0, 100.0, 10.0, 1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6] {
+            let free = count as f64 - self.solve(smoothness, |_| true).effective;
+            if free < LEAST_FREEDOM && best.1.is_finite() {
+                break;
+            }
             let here = error(smoothness);
             // Among equal errors, the smoother curve.
-            if here <= best.1 {
+            if here < best.1 {
                 best = (smoothness, here);
             }
         }

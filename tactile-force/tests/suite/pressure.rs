@@ -149,6 +149,42 @@ fn grey_levels_beyond_those_seen_are_flagged() {
     );
 }
 
+/// Forces without any error leave no residual on a curve that follows every press.
+#[test]
+fn a_few_presses_under_exact_forces_have_an_error_that_holds() {
+    let radius = |force: f64| (force / 2.5e7).cbrt();
+    let (mut held, mut errors) = (0, Vec::new());
+    for power in [0.8, 0.9, 1.1, 1.2, 1.3] {
+        for count in [5, 6, 7] {
+            // Hertz's pressure under a ball on 20 µm pixels, grey levels as a power of it.
+            let press = |k: u32| {
+                let force = 0.4 * f64::from(k) / f64::from(count);
+                let (a, pixel) = (radius(force), 2e-5);
+                let peak = 1.5 * force / (std::f64::consts::PI * a * a);
+                let side = (a / pixel) as i32 + 1;
+                let greys = (-side..=side).flat_map(|y| (-side..=side).map(move |x| (x, y)));
+                let greys = greys.map(|(x, y)| {
+                    let r2 = f64::from(x * x + y * y) * pixel * pixel / (a * a);
+                    (200.0 * (peak * (1.0 - r2).max(0.0).sqrt() / 4e4).powf(power)) as f32
+                });
+                let light = GreyHistogram::from_differences(greys, pixel * pixel);
+                CalibrationFrame::new(light, force, Branch::Loading).unwrap()
+            };
+            let frames: Vec<_> = (1..=count).map(press).collect();
+            let curve = PressureCurve::fit(&frames, &PressureCurveOptions::default()).unwrap();
+            assert!(curve.report.effective_parameters <= f64::from(count) - 2.0);
+            let grey = 0.9 * curve.report.identified_grey[1];
+            let truth = 4e4 * (grey / 200.0).powf(power.recip());
+            let found = curve.pressure_pa(grey);
+            let interval = found.interval_95();
+            let below = interval.upper.is_none_or(|upper| truth <= upper);
+            held += u32::from(interval.lower <= truth && below);
+            errors.push((found.value / truth - 1.0, found.standard_error / truth));
+        }
+    }
+    assert!(held >= 14, "{held} of 15: {errors:?}");
+}
+
 #[test]
 fn frames_that_determine_no_curve_are_refused() {
     let disc = |grey: f32| GreyHistogram::from_differences(std::iter::repeat_n(grey, 500), AREA_M2);
