@@ -22,7 +22,7 @@ use tactile_imaging::pipeline::FrameSource;
 /// video, and a line without an end would fill the memory.
 pub(super) const LONGEST_HEADER: u64 = 4096;
 
-pub(crate) use self::npy::{Member, header_fields};
+pub(crate) use self::npy::{header_fields, members};
 
 /// First bytes of an array of NumPy, and of an archive of them.
 pub(super) const ARRAY_STARTS: [&[u8]; 2] = npy::START;
@@ -58,8 +58,7 @@ const MOST_NAMED: usize = 10;
 /// As a [`FrameSource`] it gives grey frames. [`next_colour_frame`](Self::next_colour_frame) gives
 /// those of a gel that is lit in colours.
 ///
-/// Memory is that of one frame, but for TIFF, other images and an array of an archive, which are read
-/// whole, the latter to 512 MiB.
+/// Memory is that of one frame, but for TIFF and other images, which are read whole.
 ///
 /// ```
 /// use ndarray::{Array2, array};
@@ -427,7 +426,7 @@ impl FrameSource for FrameReader {
 }
 
 /// Why a stream does not go on.
-pub(crate) enum Broken {
+enum Broken {
     Read(Error),
     Content {
         expected: String,

@@ -4,7 +4,7 @@
 //! beforehand, and no well-kept crate reads `.mat`.
 use super::error::{FileError, FilePlace, quoted};
 use super::files::LARGEST_FILE;
-use super::frames::{ARRAY_STARTS, Member, header_fields};
+use super::frames::{ARRAY_STARTS, header_fields, members};
 use super::text::TextCells;
 use flate2::read::ZlibDecoder;
 use ndarray::{Array3, ArrayD, IxDyn, ShapeBuilder};
@@ -206,18 +206,11 @@ fn arrays(bytes: &[u8]) -> Option<Vec<Array>> {
     if !bytes.starts_with(ARRAY_STARTS[1]) {
         return None;
     }
-    let (mut rest, mut total) = (bytes, 0);
-    let (mut arrays, mut any) = (Vec::new(), false);
-    while let Ok(Some(Member { name, content, .. })) = Member::next(&mut rest) {
-        let bytes = content.get_ref();
-        total += bytes.len() as u64;
-        // A spreadsheet is an archive, too.
-        if name.ends_with(".npy") && total <= LARGEST_FILE {
-            any = true;
-            arrays.extend(of_npy(&name, bytes));
-        }
-    }
-    any.then_some(arrays)
+    // A spreadsheet is an archive, too.
+    let mut files = members(bytes, LARGEST_FILE).unwrap_or_default();
+    files.retain(|(name, _)| name.ends_with(".npy"));
+    let arrays = files.iter().filter_map(|(name, bytes)| of_npy(name, bytes));
+    (!files.is_empty()).then(|| arrays.collect())
 }
 
 /// The cells of arrays: of one array, or of several columns of one length, each by its name. `None`

@@ -1,12 +1,12 @@
 //! Frames that NumPy wrote: arrays in `.npy` files and in `.npz` archives.
 //!
-//! A reader of its own for a header of three fields: those that exist bring a parser of Python's
-//! literals.
-use super::super::files::LARGEST_FILE;
+//! A reader of its own: those that exist find an archive's arrays from its end, where a pipe cannot
+//! go, and bring a parser of Python's literals for a header of three fields.
 use super::{Broken, Decoder, Encoded, Format, LONGEST_HEADER, append, is_read, quoted};
 use ::image::{DynamicImage, ImageBuffer};
-use std::io::{BufRead, Cursor, Read};
-use zip::read::read_zipfile_from_stream;
+use flate2::{Crc, Decompress, FlushDecompress, Status};
+use std::io::{BufRead, Error, ErrorKind, Read, Result as IoResult, copy, sink};
+use std::mem::take;
 
 /// The first bytes of an array, or of an archive.
 pub(super) const START: [&[u8]; 2] = [b"\x93NUMPY", b"PK\x03\x04"];
@@ -14,50 +14,69 @@ pub(super) const START: [&[u8]; 2] = [b"\x93NUMPY", b"PK\x03\x04"];
 pub(super) const FORMAT: Format = Format {
     name: "NPY",
     begins: |start| start.starts_with(START[0]),
-    open: |_| Ok(Box::new(Arrays::default())),
+    open: |_| Ok(Box::new(Arrays::new(false))),
 };
 
 pub(super) const ARCHIVE: Format = Format {
     name: "NPZ",
     begins: |start| start.starts_with(START[1]),
-    open: |_| {
-        Ok(Box::new(Arrays {
-            member: Some(Member::default()),
-            ..Arrays::default()
-        }))
-    },
+    open: |_| Ok(Box::new(Arrays::new(true))),
 };
 
 /// The arrays of a stream, one after the other.
-#[derive(Default)]
 struct Arrays {
-    /// The file of an archive that is read. `None` for arrays without an archive.
-    member: Option<Member>,
+    archived: bool,
+    member: Member,
     layout: Option<Layout>,
     /// Frames of the array that were not read yet.
     left: usize,
     found_any: bool,
 }
 
+impl Arrays {
+    fn new(archived: bool) -> Self {
+        Self {
+            archived,
+            member: Member::default(),
+            layout: None,
+            left: 0,
+            found_any: false,
+        }
+    }
+
+    fn source<'a>(&'a mut self, input: &'a mut dyn BufRead) -> Box<dyn Read + 'a> {
+        match self.archived {
+            true => Box::new(Source {
+                input,
+                member: &mut self.member,
+            }),
+            false => Box::new(input),
+        }
+    }
+}
+
 impl Decoder for Arrays {
     /// Arrays of an archive that hold other numbers are passed over.
-    fn next(&mut self, mut input: &mut dyn BufRead, _: Vec<u8>) -> Result<Option<Encoded>, Broken> {
+    fn next(&mut self, input: &mut dyn BufRead, _: Vec<u8>) -> Result<Option<Encoded>, Broken> {
         while self.left == 0 {
-            if let Some(member) = &mut self.member {
-                if let Some(broken) = member.broken.take() {
-                    return Err(broken);
+            if self.archived {
+                if self.layout.take().is_some() {
+                    // What ends the array is read with its checksum.
+                    copy(&mut self.source(input).take(1), &mut sink())?;
                 }
-                match Member::next(input)? {
-                    Some(next) => *member = next,
+                self.member.end(input)?;
+                match Member::open(input)? {
+                    Some(member) => self.member = member,
                     None if self.found_any => return Ok(None),
                     None => return Err(Broken::new("an array of frames", "none")),
                 }
             } else if input.fill_buf()?.is_empty() {
                 return Ok(None);
             }
-            match Layout::read(source(&mut self.member, &mut input)) {
+            let layout = Layout::read(&mut self.source(input));
+            match layout {
                 Ok(layout) => (self.left, self.layout) = (layout.frames, Some(layout)),
-                Err(Broken::Content { .. }) if self.member.is_some() => {}
+                Err(Broken::Content { .. }) if self.archived => {}
                 Err(broken) => return Err(broken),
             }
         }
@@ -73,24 +92,11 @@ impl Decoder for Arrays {
         self.left -= 1;
         self.found_any = true;
         let mut samples = Vec::new();
-        append(
-            source(&mut self.member, &mut input),
-            layout.bytes(),
-            &mut samples,
-        )?;
+        append(&mut self.source(input), layout.bytes(), &mut samples)?;
         if samples.len() < layout.bytes() {
-            let broken = self.member.as_mut().and_then(|member| member.broken.take());
-            return Err(broken.unwrap_or(Broken::cut(layout.bytes(), samples.len())));
+            return Err(Broken::cut(layout.bytes(), samples.len()));
         }
         Ok(layout.image(samples).map(Encoded::Decoded))
-    }
-}
-
-/// What the arrays are read from.
-fn source<'a>(member: &'a mut Option<Member>, input: &'a mut &mut dyn BufRead) -> &'a mut dyn Read {
-    match member {
-        Some(member) => &mut member.content,
-        None => input,
     }
 }
 
@@ -196,34 +202,154 @@ pub(crate) fn header_fields(header: &str) -> Option<(&str, bool, Vec<usize>)> {
     Some((kind, fortran, sides.ok()?))
 }
 
-/// A file of an archive, read whole.
+/// Names and contents of the files of an archive, of at most so many bytes together. `None` for one
+/// that cannot be read.
+pub(crate) fn members(mut input: &[u8], mut most: u64) -> Option<Vec<(String, Vec<u8>)>> {
+    let mut files = Vec::new();
+    while let Some(mut member) = Member::open(&mut input).ok()? {
+        let mut bytes = Vec::new();
+        let source = Source {
+            input: &mut input,
+            member: &mut member,
+        };
+        most -= source.take(most).read_to_end(&mut bytes).ok()? as u64;
+        let name = take(&mut member.name);
+        member.end(&mut input).ok()?;
+        files.push((name, bytes));
+    }
+    Some(files)
+}
+
+/// A file of an archive, as its local header announces it.
 #[derive(Default)]
-pub(crate) struct Member {
-    pub name: String,
-    pub content: Cursor<Vec<u8>>,
-    /// Why the content ends before its end.
-    broken: Option<Broken>,
+struct Member {
+    name: String,
+    /// Bytes in the archive that were not read yet.
+    left: u64,
+    inflate: Option<Decompress>,
+    sum: Crc,
+    announced_sum: u32,
+    /// Whether all was read, so that the sums can be compared.
+    ended: bool,
 }
 
 impl Member {
-    /// The next file. `None` where the list of the files begins, which stands behind them.
-    pub(crate) fn next(mut input: &mut dyn BufRead) -> Result<Option<Self>, Broken> {
-        let damaged = || {
-            Broken::new(
-                "an archive as numpy.savez writes it",
-                "another, or a damaged one",
-            )
-        };
-        let file = read_zipfile_from_stream(&mut input).map_err(|_| damaged())?;
-        let Some(mut file) = file else {
+    /// The next file. None where the list of the files begins, which stands behind them.
+    fn open(input: &mut dyn BufRead) -> Result<Option<Self>, Broken> {
+        const FILE: &[u8] = b"PK\x03\x04";
+        /// Sizes that stand in the extra field, in 64 bits.
+        const ELSEWHERE: u64 = u32::MAX as u64;
+        let mut start = Vec::new();
+        append(input, 4, &mut start)?;
+        if [&b"PK\x01\x02"[..], b"PK\x05\x06"].contains(&start.as_slice()) {
             return Ok(None);
+        }
+        if start != FILE {
+            let found = match start.len() {
+                4 => format!("`{}`", start.escape_ascii()),
+                cut => format!("the end after {cut} bytes"),
+            };
+            return Err(Broken::new("a file of the archive", found));
+        }
+        let mut header = [0; 26];
+        input.read_exact(&mut header)?;
+        let number = |at: usize, bytes: usize| {
+            let digits = header[at..at + bytes].iter().rev();
+            digits.fold(0, |sum, digit| 256 * sum + u64::from(*digit))
         };
-        let mut bytes = Vec::new();
-        let read = (&mut file).take(LARGEST_FILE).read_to_end(&mut bytes);
+        let (flags, method) = (number(2, 2), number(4, 2));
+        let mut names = Vec::new();
+        append(input, (number(22, 2) + number(24, 2)) as usize, &mut names)?;
+        let mut left = number(14, 4);
+        if left == ELSEWHERE {
+            // The field of 64-bit sizes: its kind 1, its length, the size, the size in the archive.
+            let mut extra = names.get(number(22, 2) as usize..).unwrap_or_default();
+            left = loop {
+                let Some((head, rest)) = extra.split_at_checked(4) else {
+                    return Err(Broken::new("a size of the array", "none"));
+                };
+                let size = rest.get(8..16).and_then(<[u8]>::first_chunk);
+                if let ([1, 0], Some(size)) = (&head[..2], size) {
+                    break u64::from_le_bytes(*size);
+                }
+                let length = usize::from(u16::from_le_bytes([head[2], head[3]]));
+                extra = rest.get(length..).unwrap_or_default();
+            };
+        }
+        let inflate = match method {
+            0 => None,
+            8 => Some(Decompress::new(false)),
+            _ => {
+                return Err(Broken::new(
+                    "arrays stored or deflated",
+                    format!("method {method}"),
+                ));
+            }
+        };
+        // An encrypted file, or one whose size follows it.
+        if flags & 0b1001 != 0 {
+            return Err(Broken::new(
+                "an archive as numpy.savez writes it to a file",
+                "another",
+            ));
+        }
+        let name = &names[..names.len().min(number(22, 2) as usize)];
         Ok(Some(Self {
-            name: file.name().map_err(|_| damaged())?.into(),
-            content: Cursor::new(bytes),
-            broken: read.is_err().then(damaged),
+            name: String::from_utf8_lossy(name).into(),
+            left,
+            inflate,
+            sum: Crc::new(),
+            announced_sum: number(10, 4) as u32,
+            ended: false,
         }))
+    }
+
+    /// Passes over what was not read of the file.
+    fn end(&mut self, input: &mut dyn BufRead) -> IoResult<()> {
+        copy(&mut input.take(self.left), &mut sink())?;
+        self.left = 0;
+        Ok(())
+    }
+}
+
+/// What a file of an archive holds.
+struct Source<'a> {
+    input: &'a mut dyn BufRead,
+    member: &'a mut Member,
+}
+
+impl Read for Source<'_> {
+    fn read(&mut self, bytes: &mut [u8]) -> IoResult<usize> {
+        let member = &mut *self.member;
+        let mut read = 0;
+        while read == 0 && !member.ended && !bytes.is_empty() {
+            let waiting = self.input.fill_buf()?;
+            let most = usize::try_from(member.left).unwrap_or(usize::MAX);
+            let waiting = &waiting[..waiting.len().min(most)];
+            if waiting.is_empty() && member.left > 0 {
+                break;
+            }
+            let used = if let Some(inflate) = &mut member.inflate {
+                let [before_in, before_out] = [inflate.total_in(), inflate.total_out()];
+                let status = inflate.decompress(waiting, bytes, FlushDecompress::None)?;
+                read = (inflate.total_out() - before_out) as usize;
+                let used = (inflate.total_in() - before_in) as usize;
+                member.ended = status == Status::StreamEnd || used + read == 0;
+                used
+            } else {
+                read = waiting.len().min(bytes.len());
+                bytes[..read].copy_from_slice(&waiting[..read]);
+                member.ended = member.left == read as u64;
+                read
+            };
+            self.input.consume(used);
+            member.left -= used as u64;
+            member.sum.update(&bytes[..read]);
+            if member.ended && member.sum.sum() != member.announced_sum {
+                let words = "an array of the archive is damaged: its checksum differs";
+                return Err(Error::new(ErrorKind::InvalidData, words));
+            }
+        }
+        Ok(read)
     }
 }
