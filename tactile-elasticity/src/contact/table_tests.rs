@@ -222,7 +222,7 @@ fn curves_without_meaning_are_refused() {
     refuses("force: expected 16", |c| c[1].force_n.truncate(5));
     refuses("force = ", |c| c[1].force_n.swap(2, 3));
     // The stiffer ball has the smaller force.
-    refuses("the table's force does not grow", |c| {
+    refuses("the force of the table does not always increase", |c| {
         c[1].force_n.iter_mut().for_each(|f| *f *= 0.3);
     });
 }

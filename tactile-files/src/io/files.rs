@@ -15,6 +15,10 @@ use {
     std::os::fd::AsRawFd,
 };
 
+/// Longest line of a video's header and longest header of an image, in bytes. Longer ones are no
+/// video, and a line without an end would fill the memory.
+pub(super) const LONGEST_HEADER: u64 = 4096;
+
 /// Largest file that is read, in bytes. No table, scene or frame needs more, and a device never
 /// ends.
 pub(super) const LARGEST_FILE: u64 = 512 << 20;

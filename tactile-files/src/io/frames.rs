@@ -8,7 +8,7 @@ mod pages;
 mod y4m;
 
 use super::error::{FileError, FilePlace, quoted};
-use super::files::open_file;
+use super::files::{LONGEST_HEADER, open_file};
 use super::image::{Grey, colour_levels, decode, eight_bit_levels, largest_image};
 use ::image::DynamicImage;
 use ndarray::{Array2, Array3};
@@ -17,10 +17,6 @@ use std::mem::take;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tactile_imaging::pipeline::FrameSource;
-
-/// Longest line of a video's header and longest header of an image, in bytes. Longer ones are no
-/// video, and a line without an end would fill the memory.
-pub(super) const LONGEST_HEADER: u64 = 4096;
 
 pub(crate) use self::npy::{header_fields, members};
 

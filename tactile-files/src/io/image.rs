@@ -1,7 +1,6 @@
 //! Grey images from PNG, PGM, JPEG and TIFF files.
 use super::error::FileError;
-use super::files::{read_bytes, write_bytes};
-use super::frames::LONGEST_HEADER;
+use super::files::{LONGEST_HEADER, read_bytes, write_bytes};
 use super::kinds::kind_of;
 use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
