@@ -117,13 +117,13 @@ impl<const D: usize> StrainBetweenOptions<D> {
         after: &[Point<f64, D>],
         pairs: &[(usize, usize)],
     ) -> Result<StrainBetween<D>, StrainBetweenError> {
-        let possible = pairs.len();
+        let work = self.work();
         self.allow(StrainBetween::of_share(
             before,
             after,
             pairs,
-            self.work(),
-            possible,
+            work,
+            pairs.len(),
         )?)
     }
 

@@ -162,7 +162,8 @@ pub enum Flag {
     #[error(
         "frame {}: a mean stress of {mean_stress_pa:.1e} Pa is {}: are the forces in newtons \
          and the pixel sizes in the stated unit?",
-        frame + 1, if *mean_stress_pa > 1.0e3 { "more than any gel withstands" } else { "less than any gel shows" }
+        frame + 1,
+        if *mean_stress_pa > 1.0e3 { "more than any gel withstands" } else { "less than any gel shows" }
     )]
     UnlikelyStress {
         /// The frame.
@@ -242,8 +243,8 @@ pub enum Flag {
     },
     /// The sample relaxes: the modulus is a mean over the times of the frames.
     #[error(
-        "the sample relaxes from {:.1} to {:.1} kPa with a time constant of {time_constant_s:.2} s: the modulus is a \
-         mean over the time of the frames",
+        "the sample relaxes from {:.1} to {:.1} kPa with a time constant of \
+         {time_constant_s:.2} s: the modulus is a mean over the time of the frames",
         1e-3 * instantaneous_pa, 1e-3 * equilibrium_pa
     )]
     SampleRelaxes {

@@ -56,7 +56,10 @@ pub enum ForceError {
         required: f64,
     },
     /// Too much of the contact is saturated for a reliable force.
-    #[error("{share} of the contact is saturated, more than the allowed {limit}")]
+    #[error(
+        "{:.2} % of the contact is saturated, more than the allowed {:.2} %",
+        100.0 * share, 100.0 * limit
+    )]
     SaturatedContact {
         /// Fraction of the contact's pixels that are saturated.
         share: f64,

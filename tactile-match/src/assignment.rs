@@ -149,8 +149,8 @@ impl Search {
         std::mem::swap(&mut self.free, &mut self.waiting);
     }
 
-    /// Follows the shortest augmenting path from a free row. Returns `None` if only forbidden pairs
-    /// lead on.
+    /// Follows the shortest augmenting path from a free row. The row stays free if only forbidden
+    /// pairs lead on.
     fn augment(&mut self, costs: &[f64], columns: usize, free_row: usize) {
         for (j, &c) in costs[free_row * columns..][..columns].iter().enumerate() {
             self.distance[j] = c - self.prices[j];

@@ -98,21 +98,17 @@ pub(crate) fn fitted<const D: usize>(
     if sure.len() >= FIELD {
         let (sources, images): (Vec<_>, Vec<_>) = sure.iter().map(|pair| ends(pair)).unzip();
         if let Ok(field) = LocalField::fit(&sources, &images) {
-            let mut moved = vec![None; model.len()];
+            // The fit holds the displacements of its own pairs.
+            let (mut warped, mut left) = (model.to_vec(), vec![true; model.len()]);
             for (pair, at) in sure.iter().zip(&field.values) {
-                moved[pair.0] = Some(model[pair.0] + at.displacement);
+                warped[pair.0] += at.displacement;
+                left[pair.0] = false;
             }
-            let left = model
-                .iter()
-                .zip(&moved)
-                .filter(|(_, moved)| moved.is_none());
-            let left: Vec<_> = left.map(|(point, _)| *point).collect();
-            let mut left = left.iter().zip(field.at(&left));
-            let mut next = || left.next().map(|(point, at)| point + at.displacement);
-            let warped: Vec<_> = moved
-                .into_iter()
-                .filter_map(|moved| moved.or_else(&mut next))
-                .collect();
+            let left: Vec<_> = (0..model.len()).filter(|&i| left[i]).collect();
+            let places: Vec<_> = left.iter().map(|&i| model[i]).collect();
+            for (&i, at) in left.iter().zip(field.at(&places)) {
+                warped[i] += at.displacement;
+            }
             if are_usable(&warped) {
                 return (Box::new(field), warped);
             }

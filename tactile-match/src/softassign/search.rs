@@ -344,7 +344,7 @@ impl AnnealedSoftassign {
         ControlFlow::Continue(())
     }
 
-    /// Runs from a start. Returns `None` if the sets have no such start.
+    /// Runs from a start. Does nothing if the sets have no such start.
     fn run<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
