@@ -1,4 +1,4 @@
-//! Frames of gels under coloured light: calibration, contacts and tracked markers.
+//! Frames of gels lit in colours: calibration, contacts and tracked markers.
 #![allow(missing_docs)]
 
 use std::hint::black_box;

@@ -65,7 +65,7 @@ pub(crate) fn pixel_um(text: &str) -> Result<[f64; 2], String> {
         physical(&side.to_string(), InputQuantity::PixelSide, 1e-6, "µm")?;
     }
     if (x / y).max(y / x) > InputQuantity::MOST_UNEQUAL_SIDES {
-        return Err("expected sides of one unit, of which neither is ten times the other".into());
+        return Err("expected sides in one unit, neither of which is ten times the other".into());
     }
     Ok([x, y])
 }
@@ -82,7 +82,7 @@ pub(crate) fn one_or_two(text: &str) -> Result<[f64; 2], String> {
     match numbers.as_deref() {
         Ok(&[both]) => Ok([both; 2]),
         Ok(&[x, y]) => Ok([x, y]),
-        _ => Err("expected one number above zero, or two between a comma".to_owned()),
+        _ => Err("expected one number above zero, or two separated by a comma".to_owned()),
     }
 }
 
@@ -161,9 +161,9 @@ impl TableArguments {
         Ok(columns)
     }
 
-    /// Frames of points. A table of tracked points has several, and one file alone of a single frame
-    /// has displacements beside its points. Row i of one that is paired is row i of the others, and NaN
-    /// stands for numbers that are not there. An empty file of a series is an empty frame.
+    /// Frames of points. A table of tracked points has several frames. A single file with one frame
+    /// must have displacements beside its points. For paired frames row i of one is row i of the
+    /// others, and missing numbers are NaN. An empty file of a series is an empty frame.
     pub(crate) fn read_points(
         &self,
         paths: &[impl AsRef<Path>],
@@ -240,11 +240,11 @@ impl TableArguments {
 /// Frames of points. Either all of their coordinates have a unit, or none.
 pub(crate) struct PointFrames {
     pub frames: Vec<PointFrame>,
-    /// The number of frames without points, which were passed over.
+    /// The number of frames without points, which are skipped.
     pub empty: usize,
 }
 
-/// Points, the number of their frame, from 1 among all that were given, and its name.
+/// Points, the number of their frame from 1 among all given frames, and its name.
 pub(crate) struct PointFrame {
     pub number: usize,
     pub name: String,

@@ -22,13 +22,13 @@ use tactile_imaging::force::{
 /// Calibrate a sensor from frames of presses, or fit the line from pixel value to force
 ///
 /// CALIBRATION.toml lists frames of rigid balls or flat punches of known radius under forces
-/// measured by a gauge, a frame without contact, the stated layers of the guide and, if there is
-/// one, a frame of a dot target. The local light-to-pressure curve, the lens and the layers are
-/// determined with their errors. --out sensor.toml writes the sensor file for scenes, and next to
-/// it sensor.svg, a report of which properties the presses determine and which they do not. If the
-/// frames cannot be used, no file is written.
+/// measured by a gauge. It also names a frame without contact, the stated layers of the guide and,
+/// optionally, a frame of a dot target. The local light-to-pressure curve, the lens and the layers
+/// are determined with their errors. --out sensor.toml writes the sensor file for scenes, and next
+/// to it sensor.svg, a report of which properties the presses determine and which they do not. If
+/// the frames cannot be used, no file is written.
 ///
-/// With kind = "photometric" the file lists presses of a ball on a gel under coloured light: a
+/// With kind = "photometric" the file lists presses of a ball on a gel lit in colours. It has a
 /// frame without contact, the pixel size, and for every press the radius of the ball and optionally
 /// its drawn contact circle. Wrong circles are reported. --out sensor.toml writes the sensor file
 /// for `tactile depth --sensor`, and the frame without contact next to it.

@@ -173,7 +173,8 @@ impl Context {
         if !self.json || self.reader_left || self.error.is_some() {
             return;
         }
-        // Number by number, because the text of the result of many frames would double the memory.
+        // The value is written number by number, because the text of the result of many frames
+        // would double the memory.
         let mut output = BufWriter::new(stdout().lock());
         let written = match self.lines {
             true => serde_json::to_writer(&mut output, value),

@@ -22,22 +22,21 @@ use tactile_imaging::pipeline::{
 
 /// Find the contact and its depth in frames of a sensor that grows darker with depth
 ///
-/// TABLE.csv gives depth as a function of darkening: columns darkness (grey levels below the
-/// reference, with the same --grey) and depth (m, mm or µm according to its heading, mm without
-/// one). With --ball-radius-mm a ball of this radius is fitted to the depth, with --ball a ball of
-/// any radius. --out gets NAME_depth.csv (m, NaN outside the contacts, for the whole frame) and
-/// NAME_depth.svg for every frame NAME.
+/// TABLE.csv contains depth as a function of darkening. The column darkness is in grey levels below
+/// the reference, with the same --grey. The column depth is in the unit of its heading (m, mm or
+/// µm), or in mm without one. With --ball-radius-mm a ball of this radius is fitted to the depth,
+/// with --ball a ball of any radius. --out gets NAME_depth.csv (m, NaN outside the contacts, for
+/// the whole frame) and NAME_depth.svg for every frame NAME.
 ///
 /// No darkening is no depth. A table with the row 0, 0 is used unchanged. Other tables, such as
 /// those of 9DTact, count depth from a contact circle that was found at some darkening: they are
 /// shifted.
 ///
-/// --sensor is the sensor file of a gel under coloured light, written by `tactile calibrate`. It
-/// replaces reference, table and pixel size. --out then gets NAME_depth.csv (displacement of the
-/// surface, m, for the whole frame, zero far from contacts), NAME_gradient_x.csv and
-/// NAME_gradient_y.csv (gradient of the depth along columns and rows), NAME_contact.csv (the
-/// contact of every pixel from 1, and 0 without contact), NAME.ply (a mesh, mm), NAME.npz and
-/// NAME_depth.svg.
+/// --sensor is the sensor file of a gel lit in colours, written by `tactile calibrate`. It replaces
+/// reference, table and pixel size. --out then gets NAME_depth.csv (displacement of the surface, m,
+/// for the whole frame, zero far from contacts) and its gradients along columns and rows in
+/// NAME_gradient_x.csv and NAME_gradient_y.csv. It also gets NAME_contact.csv (the contact of every
+/// pixel from 1, and 0 without contact), NAME.ply (a mesh, mm), NAME.npz and NAME_depth.svg.
 #[derive(Args)]
 #[command(
     mut_arg("reference", |arg| unless_sensor(arg, ".")),
@@ -55,7 +54,7 @@ Examples:
 pub(crate) struct DepthArguments {
     #[command(flatten)]
     frames: SensorFrames,
-    /// Sensor file of a gel under coloured light.
+    /// Sensor file of a gel lit in colours.
     #[arg(long, value_name = "SENSOR.toml",
           conflicts_with_all = ["reference", "pixel_um", "table", "ball", "ball_radius_mm",
                                 "zero_table"])]

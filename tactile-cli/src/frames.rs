@@ -1,4 +1,4 @@
-//! The frames of images, stacks, videos and pipes, as several subcommands measure them.
+//! The frames of images, stacks, videos and pipes, for several subcommands.
 use crate::arguments::{pixel_um, same_shape};
 use crate::console::{Bar, Context};
 use crate::failure::Failure;
@@ -12,20 +12,20 @@ use std::path::{Path, PathBuf};
 use tactile_files::io::{FileError, FrameReader, Grey, image_colour, read_grey_image};
 use tactile_imaging::pipeline::FrameSource;
 
-/// Frames per second where neither stream nor argument states them: those of the paper's camera.
+/// Frames per second if neither stream nor argument states them: the rate of the paper's camera.
 pub(crate) const DEFAULT_RATE_HZ: f64 = 80.0;
 
-/// The pixels of a frame, grey or in colours.
+/// The pixels of a frame, in grey or in colour.
 pub(crate) trait Pixels: Default {
     const IS_GREY: bool;
 
-    /// Reads the next frame in place of this one, and returns its time in seconds.
+    /// Replaces this frame by the next one and returns its time in seconds.
     fn read_next(&mut self, reader: &mut FrameReader) -> Result<Option<f64>, FileError>;
 
     /// Rows and columns.
     fn size(&self) -> (usize, usize);
 
-    /// `[row, column, channel]`.
+    /// The samples, `[row, column, channel]`.
     fn channels(&self) -> ArrayView3<'_, u8>;
 }
 
@@ -61,10 +61,10 @@ impl Pixels for Array3<u8> {
     }
 }
 
-/// The help of an argument of frames.
+/// The help of an argument for frames.
 pub(crate) fn frames_help(what: &str) -> String {
     let formats = tactile_files::io::frame_formats();
-    format!("{what}: {formats}, `-` for a pipe of any of them")
+    format!("{what}: {formats}, or `-` for a pipe of any of them")
 }
 
 /// Pressed frames and the frame without contact.
@@ -78,13 +78,13 @@ pub(crate) struct SensorFrames {
     /// Size of a pixel on the sensor's surface in micrometres, or its width and height.
     #[arg(long, value_name = "X[,Y]", value_parser = pixel_um, allow_negative_numbers = true)]
     pixel_um: [f64; 2],
-    /// Bits of the camera, for images of 16 bits whose file does not say.
+    /// Bits of the camera, for 16-bit images whose file does not state them.
     #[arg(long, value_parser = clap::value_parser!(u8).range(8..=16))]
     bits: Option<u8>,
 }
 
 impl SensorFrames {
-    /// Reference, a table and the frames: the files that are read.
+    /// The files that are read: reference, a table and the frames.
     pub(crate) fn files<'a>(&'a self, table: &'a Path) -> Vec<&'a Path> {
         let frames = self.frames.iter().map(PathBuf::as_path);
         frames.chain([self.reference.as_path(), table]).collect()
@@ -99,7 +99,7 @@ impl SensorFrames {
         Ok(read_grey_image(&self.reference, grey, self.bits)?.to_u8())
     }
 
-    /// How the pressed frames are read.
+    /// The options for reading the pressed frames.
     pub(crate) fn reading(&self, grey: Grey, reference: &Array2<u8>) -> Reading<'_> {
         Reading {
             grey,
@@ -110,7 +110,8 @@ impl SensorFrames {
     }
 }
 
-/// How frames are read: the colours' grey, the camera's bits and the reference they have to fit.
+/// The options for reading frames: conversion to grey, bits of the camera, and the reference that
+/// they must match.
 #[derive(Clone, Copy)]
 pub(crate) struct Reading<'a> {
     pub grey: Grey,
@@ -126,7 +127,8 @@ impl Reading<'_> {
         Ok(reader.with_grey(self.grey).with_bits(self.bits))
     }
 
-    /// Reads the next frame and refuses one of another size than the reference. False at the end.
+    /// Reads the next frame and refuses it if its size differs from the reference. Returns false at
+    /// the end.
     fn next<P: Pixels>(
         &self,
         source: &mut FrameReader,
@@ -140,12 +142,12 @@ impl Reading<'_> {
         Ok(true)
     }
 
-    /// Gives the frames of these files one after the other to `work`, in the memory of one frame,
-    /// until Ctrl-C. A file that cannot be read, or breaks off, is a caution, and the next one
-    /// follows. Returns how many files and frames could not be read.
+    /// Passes the frames of these files in order to `work`, with the memory of one frame, until
+    /// Ctrl-C. If a file cannot be read or is cut short, a caution is given and the next file
+    /// follows. Returns the number of files and frames that could not be read.
     ///
     /// # Errors
-    /// That of the first file, if none has a frame.
+    /// The error of the first file, if no file has a frame.
     pub(crate) fn each<P: Pixels>(
         &self,
         paths: &[PathBuf],
@@ -214,7 +216,7 @@ impl Reading<'_> {
         Err(first)
     }
 
-    /// All frames of these files, and how many files and frames could not be read.
+    /// All frames of these files, and the number of files and frames that could not be read.
     pub(crate) fn all<P: Pixels>(
         &self,
         paths: &[PathBuf],
@@ -231,8 +233,8 @@ impl Reading<'_> {
     }
 }
 
-/// Cautions on the damaged frames of a stream and on those that its recorder dropped. Returns the
-/// number of damaged ones.
+/// Gives cautions about damaged frames of a stream and about frames that its recorder dropped.
+/// Returns the number of damaged frames.
 fn passed_over(path: &Path, source: &FrameReader, context: &mut Context) -> usize {
     let (dropped, damaged, sentences) = source.passed_over();
     let path = path.display();
@@ -249,25 +251,25 @@ fn passed_over(path: &Path, source: &FrameReader, context: &mut Context) -> usiz
     damaged as usize
 }
 
-/// Mean red, green and blue of an image, `None` for a grey one.
+/// Mean red, green and blue of an image. `None` for a grey image.
 type Colour = Option<[f64; 3]>;
 
-/// Share of the difference of two frames' mean colours that is left if red and blue of one are
-/// exchanged, below which they were. Colours of one kind of light differ by less than this.
+/// Red and blue are exchanged if exchanging them reduces the difference between the mean colours of
+/// two frames below this share. Under the same light the difference does not fall so far.
 const EXCHANGED: f64 = 0.5;
 
-/// What is known of the colours of the frames and their reference.
+/// The state of the comparison of colours between the frames and their reference.
 pub(crate) enum Colours {
     Unknown,
-    /// Those of the reference.
+    /// The mean colours of the reference.
     Reference(Colour),
-    /// A caution was given: one is enough.
+    /// A caution was given. One is enough.
     Warned,
 }
 
 impl Colours {
-    /// Cautions if a frame is in colour and its reference is grey, or the other way round, or if red
-    /// and blue of one are exchanged.
+    /// Gives a caution if only one of frame and reference is in colour, or if red and blue are
+    /// exchanged in one of them.
     pub(crate) fn compare(
         &mut self,
         reference: &Path,
@@ -276,7 +278,7 @@ impl Colours {
         context: &mut Context,
     ) {
         if let Self::Unknown = self {
-            // A sensor file has no colours of its own, and its reference was read before.
+            // A sensor file has no colours, and its reference was read before.
             *self = image_colour(reference).map_or(Self::Warned, Self::Reference);
         }
         let Self::Reference(rest) = *self else {
@@ -310,16 +312,16 @@ fn off(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// A frame as it comes.
+/// A frame that was just read.
 pub(crate) struct Arrived<'a, P> {
     pub path: &'a Path,
     /// The index of its file.
     pub file: usize,
-    /// Among the frames that were read from its file, from 1.
+    /// Number among the frames that were read from its file, from 1.
     pub number: usize,
-    /// Among all frames of its file, those that were dropped or damaged too, from 1.
+    /// Number among all frames of its file, including dropped and damaged ones, from 1.
     pub place: usize,
-    /// Frames per second that its file states.
+    /// Frames per second as stated by its file.
     pub rate_hz: Option<f64>,
     pub pixels: &'a mut P,
 }
@@ -334,7 +336,7 @@ impl<P: Default> Arrived<'_, P> {
 /// A frame with its name.
 pub(crate) struct NamedFrame<P = Array2<u8>> {
     pub name: String,
-    /// What the files of its results begin with.
+    /// First part of the names of its result files.
     pub stem: OsString,
     pub pixels: P,
 }
@@ -355,7 +357,7 @@ impl<P> NamedFrame<P> {
         Self { name, stem, pixels }
     }
 
-    /// The name of a result.
+    /// The name of a result file.
     pub(crate) fn file(&self, suffix: &str) -> OsString {
         let mut name = self.stem.clone();
         name.push(suffix);

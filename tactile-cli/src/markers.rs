@@ -19,10 +19,10 @@ use tactile_imaging::gel::{MarkerField, find_markers};
 /// Dark dots of one size are found in colour or grey images, even under uneven light. The matcher
 /// pairs them in any order, and markers may be missing. Frames are followed one after the other, so
 /// that a grid may move by more than its pitch. --out gets NAME_markers.csv for every frame NAME,
-/// with one row for every marker of the reference: its position and its displacement in pixels, the
-/// standard errors of a coordinate of both, and whether it is visible (0: its displacement is
-/// estimated from those around it). With shear modulus and thickness of the gel, the force along x
-/// and y and the torque about the mean of the markers are printed.
+/// with one row per marker of the reference. A row has position and displacement in pixels, the
+/// standard errors of a coordinate of both, and whether the marker is visible (if 0, its
+/// displacement is estimated from its neighbours). With shear modulus and thickness of the gel, the
+/// force along x and y and the torque about the mean of the markers are printed.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

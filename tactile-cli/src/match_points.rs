@@ -24,9 +24,9 @@ use tactile_imaging::matching::{
 /// Two tables of points (columns x, y and z if there is one) are one case.
 ///
 /// A case file holds one or more cases: a line `case NAME D n_model n_target`, then rows `m` (a
-/// model point) and `t` (a target point) with D coordinates. The answers go to --out, a file for
-/// each case file under the same name: `case NAME time_ms`, then for every model row its warped
-/// position (`w`) and the target row assigned to it (`a`, -1 for none).
+/// model point) and `t` (a target point) with D coordinates. --out gets one file per case file,
+/// under the same name. A result is `case NAME time_ms`, then for every model row its warped
+/// position (`w`) and its assigned target row (`a`, -1 for none).
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  tactile match examples/data/cases.txt --out target/match\n  \
@@ -50,17 +50,17 @@ pub(crate) struct MatchArguments {
 /// The prior knowledge of the sets.
 #[derive(Args, Clone, Copy)]
 pub(crate) struct Expectations {
-    /// How far the target may be turned against the model.
+    /// How far the target may be rotated relative to the model.
     #[arg(long, value_enum, default_value_t = Turn::Limited)]
     rotation: Turn,
     /// Which set has points without a partner in the other.
     #[arg(long, value_enum, default_value_t = Unmatched::Both)]
     outliers: Unmatched,
-    /// What the points may do: bend smoothly, or follow one map, whose parameters are printed.
+    /// The deformation: smooth, or a single map whose parameters are printed.
     #[arg(long, value_enum, default_value_t = Change::Smooth)]
     transformation: Change,
-    /// The largest motion of a point, in the points' unit. It tells the answers of a lattice that
-    /// goes on beyond the view apart.
+    /// The largest motion of a point, in the unit of the points. For a lattice that continues
+    /// beyond the view, it excludes matches that are shifted by a lattice vector.
     #[arg(long, value_name = "LENGTH", value_parser = positive)]
     largest_motion: Option<f64>,
 }
@@ -73,13 +73,13 @@ enum Turn {
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Change {
-    /// Turn and move.
+    /// Rotate and shift.
     Rigid,
-    /// Turn, move and change the size.
+    /// Rotate, shift and scale.
     Similarity,
-    /// Follow any affine map.
+    /// Any affine map.
     Affine,
-    /// Bend smoothly.
+    /// Smooth deformation.
     Smooth,
 }
 
@@ -95,20 +95,20 @@ enum Unmatched {
 enum Method {
     /// Annealed softassign, the default matcher.
     Softassign,
-    /// The paper's relaxation labelling as printed: slow.
+    /// The paper's relaxation labelling as printed, which is slow.
     Labelling,
-    /// The same over ten candidates for each point.
+    /// Relaxation labelling over ten candidates per point.
     SparseLabelling,
     /// Coherent point drift.
     Drift,
-    /// Each model point to the nearest target point.
+    /// The nearest target point for each model point.
     Nearest,
     /// The cheapest one-to-one assignment by distance.
     Assignment,
 }
 
 impl Expectations {
-    /// The default matcher with these.
+    /// The default matcher with these expectations.
     pub(crate) fn matcher(self) -> AnnealedSoftassign {
         let rotation = match self.rotation {
             Turn::Limited => Rotation::Limited,
@@ -164,8 +164,8 @@ pub(crate) fn allow(
 ) -> Result<(), Failure> {
     let (model_points, targets) = (model as f64, target as f64);
     // The scores of all candidates take 4.5 bytes for every pair of a model and a target point.
-    // Sets of four thousand points and more are matched coarse to fine, where 3 to 8 kilobytes a
-    // point were measured.
+    // Sets of 4,000 points and more are matched coarse to fine, and 3 to 8 kB per point were
+    // measured there.
     let bytes = if model.min(target) < 4000 {
         4.5 * model_points * targets
     } else {
@@ -199,8 +199,8 @@ pub(crate) fn run(arguments: &MatchArguments, context: &mut Context) -> Result<E
         names = vec![OsString::from(TABLES_ANSWER)];
     }
     context.outputs.plan(&names, &arguments.cases)?;
-    // All files are read before the first case is matched, so that a mistake in the last costs no
-    // time.
+    // All files are read before the first case is matched, so that a mistake in the last file is
+    // found at once.
     let mut files = Vec::new();
     let read = if tables {
         vec![vec![case_of_tables(arguments, context)?]]
@@ -236,7 +236,7 @@ pub(crate) fn run(arguments: &MatchArguments, context: &mut Context) -> Result<E
                 break;
             }
         }
-        // The cases that are done are written, the file says which.
+        // The finished cases are written. The file names them.
         context.outputs.add(name, text);
         if interrupted {
             break;
@@ -251,8 +251,8 @@ pub(crate) fn run(arguments: &MatchArguments, context: &mut Context) -> Result<E
     })
 }
 
-/// Matches one case, prints a line about it, appends its answer to `text` and returns it as JSON.
-/// It is none after Ctrl-C.
+/// Matches one case, prints a line about it, appends its result to `text` and returns it as JSON.
+/// `None` after Ctrl-C.
 fn solve<const D: usize>(
     arguments: &MatchArguments,
     context: &mut Context,
@@ -275,7 +275,7 @@ fn solve<const D: usize>(
         Ok(answer) => answer,
         Err(error) => {
             context.line(format_args!("{name}: no answer: {error}"));
-            // Writing into memory does not fail, here and below.
+            // Writing to memory cannot fail, here and below.
             let _ = writeln!(text, "# {name}: no answer: {error}");
             return Some(json!({ "case": case, "error": error.to_string() }));
         }
@@ -349,7 +349,7 @@ fn described<const D: usize>(found: &FittedTransformation<D>) -> String {
     )
 }
 
-/// The same as JSON, with the matrix by rows.
+/// The parameters of a map as JSON, with its matrix by rows.
 fn parameters<const D: usize>(found: &FittedTransformation<D>) -> Value {
     let row = |r: usize| (0..D).map(|c| found.linear[(r, c)]).collect::<Vec<_>>();
     let matrix: Vec<_> = (0..D).map(row).collect();
@@ -362,10 +362,10 @@ fn parameters<const D: usize>(found: &FittedTransformation<D>) -> Value {
     })
 }
 
-/// The file of answers of two tables.
+/// The result file for two tables.
 const TABLES_ANSWER: &str = "match.txt";
 
-/// Whether these are two tables of points: neither has the line that a case begins with.
+/// Whether these are two tables of points, neither of which has the first line of a case.
 fn are_tables(paths: &[PathBuf]) -> Result<bool, Failure> {
     if paths.len() != 2 {
         return Ok(false);
@@ -380,7 +380,7 @@ fn are_tables(paths: &[PathBuf]) -> Result<bool, Failure> {
     Ok(true)
 }
 
-/// One case of two tables.
+/// Reads two tables as one case.
 fn case_of_tables(arguments: &MatchArguments, context: &mut Context) -> Result<MatchCase, Failure> {
     let paths = &arguments.cases;
     let mut tables = arguments
@@ -403,7 +403,7 @@ fn case_of_tables(arguments: &MatchArguments, context: &mut Context) -> Result<M
         }
         _ => {
             return Err(Failure::input(
-                "both tables must have two coordinates a point, or both three",
+                "both tables must have two coordinates per point, or both three",
             ));
         }
     };

@@ -21,12 +21,12 @@ use tactile_simulate::{PressLoad, PressOptions, PressSimulation, PressTruth, Tri
 
 /// Measure the Young's modulus of an object from frames at two or more loads
 ///
-/// Without SCENE.toml it simulates the experiment of the paper (a ball of 3 mm radius pressed with
-/// 0.7 N and 1.2 N on the layered waveguide), measures the simulated frames, and prints every
+/// Without SCENE.toml it simulates the experiment of the paper: a ball of 3 mm radius pressed with
+/// 0.7 N and 1.2 N on the layered waveguide. It measures the simulated frames and prints every
 /// result with its true value. With SCENE.toml it measures the frames of a scene. With the sensor
-/// file of a gel under coloured light it prints depth, contact and force in every frame, and writes
-/// the files of `tactile depth --sensor`. --repeat N prints the median and the 99th centile of
-/// the times of every stage and of the whole. --out gets the plots: frames.svg, surfaces.svg,
+/// file of a gel lit in colours it prints depth, contact and force in every frame, and writes the
+/// files of `tactile depth --sensor`. --repeat N prints the median and the 99th centile of the
+/// times of every stage and of the whole. --out gets the plots: frames.svg, surfaces.svg,
 /// matches.svg, displacement.svg, strain.svg, summary.svg.
 #[derive(Args)]
 #[command(after_help = "\

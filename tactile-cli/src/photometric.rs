@@ -1,4 +1,4 @@
-//! Sensors with a gel that is lit in colours: `tactile calibrate` and `tactile depth` for them.
+//! `tactile calibrate` and `tactile depth` for gels lit in colours.
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
 use crate::frames::{NamedFrame, Reading};
@@ -17,15 +17,15 @@ use tactile_files::sensor::{PhotometricPresses, PhotometricSensor};
 use tactile_imaging::core::Estimate;
 use tactile_imaging::gel::{BallFace, CalibrationReport, GelContact, GelFrame, GelLaw, GelSensor};
 
-/// An argument that a sensor file takes the place of. `filler` is parsed and not used.
+/// An argument that a sensor file replaces. `filler` is parsed but not used.
 pub(crate) fn unless_sensor(arg: Arg, filler: &'static str) -> Arg {
     arg.required(false)
         .required_unless_present("sensor")
         .default_value_if("sensor", ArgPredicate::IsPresent, filler)
 }
 
-/// Calibrates from the presses that the file names. `sensor` is the name of the sensor file in the
-/// folder of the results. The frame without contact is written beside it.
+/// Calibrates from the presses in the file. `sensor` is the name of the sensor file in the folder
+/// of results. The frame without contact is written beside it.
 pub(crate) fn calibrate(
     path: &Path,
     sensor: &Path,
@@ -138,15 +138,15 @@ fn print(names: &[PathBuf], sensor: &GelSensor, found: &CalibrationReport, conte
     }
 }
 
-/// Why a sensor without a gel's layer has no force.
+/// The reason why a sensor without a gel layer has no force.
 const NO_GEL: &str = "the sensor file has no [gel]: give its calibration the gel's thickness \
     and modulus, a frame under a known weight, or readings of a gauge";
 
-/// Why nothing is measured.
+/// The error if a sensor file is given without frames.
 pub(crate) const NO_FRAMES: &str =
     "a sensor file names no frames: give images, a video or - for a pipe after it";
 
-/// A sensor with its law of forces, or why there is none.
+/// A sensor with its force law, or the reason why there is none.
 pub(crate) struct Reader {
     pub stereo: GelSensor,
     pub law: Result<GelLaw, String>,
@@ -161,7 +161,7 @@ impl Reader {
         Ok(Self { stereo, law })
     }
 
-    /// How its frames are read.
+    /// The options for reading its frames.
     pub(crate) fn reading<'a>(&self, sensor: &'a Path) -> Reading<'a> {
         Reading {
             grey: Grey::default(),
@@ -171,13 +171,13 @@ impl Reader {
         }
     }
 
-    /// The force of all contacts of a frame, none without contact, or why it has none.
+    /// The total force of a frame: `None` without contact, or the reason why there is none.
     pub(crate) fn force(&self, reading: &GelFrame) -> Result<Option<Estimate>, String> {
         let law = self.law.as_ref().map_err(String::clone)?;
         Ok(law.force(reading))
     }
 
-    /// The force of each contact, where the sensor has a law.
+    /// The force of each contact, if the sensor has a force law.
     fn forces(&self, reading: &GelFrame) -> Vec<Option<Estimate>> {
         match &self.law {
             Ok(law) => law.forces(reading).into_iter().map(Some).collect(),
@@ -186,7 +186,7 @@ impl Reader {
     }
 }
 
-/// A force, null without contact, or an object with the reason why there is none.
+/// A force as JSON: null without contact, or an object with the reason why there is none.
 pub(crate) fn number_or_error(force: &Result<Option<Estimate>, String>) -> Value {
     match force {
         Ok(force) => json!(force),
@@ -194,7 +194,7 @@ pub(crate) fn number_or_error(force: &Result<Option<Estimate>, String>) -> Value
     }
 }
 
-/// Reads depth, contact and force of frames with a sensor file, and gives the tables of `depth`.
+/// Reads depth, contact and force of frames with a sensor file, and writes the files of `depth`.
 pub(crate) fn measure(
     sensor: &Path,
     frames: &[PathBuf],
@@ -206,7 +206,7 @@ pub(crate) fn measure(
     depth(sensor, frames, true, context)
 }
 
-/// Files of a frame, by their suffixes.
+/// Suffixes of the files of a frame.
 const SUFFIXES: [&str; 7] = [
     "_depth.csv",
     "_gradient_x.csv",
@@ -217,8 +217,8 @@ const SUFFIXES: [&str; 7] = [
     "_depth.svg",
 ];
 
-/// Reads gradients, face and contacts of frames with a sensor file, and their forces where `forces`
-/// is set.
+/// Reads gradients, face and contacts of frames with a sensor file, and their forces if `forces` is
+/// set.
 pub(crate) fn depth(
     sensor: &Path,
     frames: &[PathBuf],
@@ -304,7 +304,7 @@ pub(crate) fn warn(reading: &GelFrame, name: &str, context: &mut Context) {
     }
 }
 
-/// A contact as JSON has it.
+/// The contacts of a frame, printed and as JSON.
 fn contacts(reading: &GelFrame, forces: &[Option<Estimate>], wanted: bool) -> Vec<Value> {
     let value = |(contact, force): (&GelContact, &Option<Estimate>)| {
         let mut value = GelReading::of_contact(contact).value();
@@ -341,13 +341,13 @@ fn print_contacts(
     }
 }
 
-/// What a frame's first contact is kept and printed by.
+/// The numbers of the first contact of a frame, for printing.
 #[derive(Clone, Copy, Serialize)]
 pub(crate) struct GelReading {
     pub centroid: [f64; 2],
     pub area_m2: f64,
     pub area_error_m2: f64,
-    /// Below the contact's own rim.
+    /// Largest depth below the rim of the contact.
     pub largest_depth_m: Estimate,
     pub depth_below_far_m: Estimate,
 }

@@ -1,14 +1,15 @@
-//! `tactile stream --record FILE`: the frames as they came, with their answers beside them.
+//! `tactile stream --record FILE`: records frames and their results.
 use crate::failure::Failure;
 use ndarray::{ArrayView3, Axis};
 use std::fs::File;
 use std::io::{BufWriter, Result as IoResult, Write};
 use std::path::{Path, PathBuf};
 
-/// Frames that `tactile stream` measures again to the same bits, and a table of the answers: a
-/// video of grey frames, or PPM images one after the other, for the colours of a video are coarser.
+/// A recording that `tactile stream` measures again to the same bits, and a table of the results.
+/// Grey frames become a video. Colour frames become a sequence of PPM images, because a video
+/// stores colours at half the resolution.
 ///
-/// Both grow frame by frame: a run that is killed leaves all frames but perhaps the last.
+/// Both files grow frame by frame. A killed run leaves all frames except perhaps the last.
 pub(crate) struct FrameRecorder {
     path: PathBuf,
     video: BufWriter<File>,
@@ -17,7 +18,7 @@ pub(crate) struct FrameRecorder {
 }
 
 impl FrameRecorder {
-    /// Makes both files. They replace none.
+    /// Creates both files. An existing file is an error.
     pub(crate) fn create(path: &Path) -> Result<Self, Failure> {
         let create = |path: &Path| {
             File::create_new(path).map_err(|error| {
@@ -43,7 +44,8 @@ impl FrameRecorder {
                 write!(video, "P6\n{columns} {rows}\n255\n")?;
             } else {
                 if !recorder.started {
-                    // A rate is a fraction there. Six decimals hold those of all cameras.
+                    // The format states the rate as a fraction. Six decimals suffice for all
+                    // cameras.
                     let rate = (1e6 * rate_hz).round();
                     writeln!(
                         video,
@@ -65,7 +67,7 @@ impl FrameRecorder {
         })
     }
 
-    /// Adds lines to the table of answers.
+    /// Adds lines to the table of results.
     pub(crate) fn answers(&mut self, lines: &[u8]) -> Result<(), Failure> {
         self.written(|recorder| recorder.answers.write_all(lines))
     }

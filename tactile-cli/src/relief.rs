@@ -1,35 +1,35 @@
-//! Surfaces as pages show them: heights that the mouse turns.
+//! Surfaces on pages, which the mouse rotates.
 use ndarray::ArrayView2;
 use serde::Serialize;
 
-/// Points along a side, at most: more would be no clearer, and turn slowly.
+/// Largest number of points along a side. More would not look better and would rotate slowly.
 const POINTS: usize = 80;
 
-/// Steps from the lowest to the highest point: finer than a page shows.
+/// Number of steps from the lowest to the highest point, finer than a page can show.
 const STEPS: u32 = 10_000;
 
-/// A rim below this share of the height is the foot of a dome: of a hemisphere ten points in radius
-/// the rim reaches to 0.44.
+/// Share of the height below which the rim counts as the foot of a dome. For a hemisphere with a
+/// radius of ten points the rim reaches 0.44.
 const FOOT: f64 = 0.5;
 
-/// Heights on a grid, as `relief.js` draws them.
+/// Heights on a grid, in the format of `relief.js`.
 #[derive(Serialize)]
 pub(crate) struct HeightGrid {
     columns: usize,
     /// Size of a grid cell along x and y and of a step of height, in millimetres.
     steps_mm: [f64; 3],
-    /// Row by row, in steps above the lowest. `None` if there is no surface.
+    /// Heights row by row, in steps above the lowest. `None` if there is no surface.
     heights: Vec<Option<u32>>,
-    /// The height, in steps, along which the surface is cut: the rim of a dome is a ragged staircase
-    /// of the grid, and lies below.
+    /// The height, in steps, below which the surface is cut. It removes the ragged rim of a dome,
+    /// which follows the steps of the grid.
     cut: u32,
-    /// From the lowest to the highest point.
+    /// Height from the lowest to the highest point.
     pub height_mm: f64,
 }
 
 impl HeightGrid {
     /// The part of `heights` that is not NaN, thinned. Heights and pixels are in millimetres.
-    /// `None` where there is no part, or a level one.
+    /// `None` if there is no such part or it is level.
     pub(crate) fn of(heights: ArrayView2<'_, f64>, pixel: [f64; 2]) -> Option<Self> {
         let known = heights
             .indexed_iter()
@@ -71,8 +71,7 @@ impl HeightGrid {
     }
 }
 
-/// The highest point of the rim, beside which there is no surface, if the rim is the foot of a dome;
-/// else 0, which cuts nothing.
+/// The highest point of the rim if the rim is the foot of a dome. Otherwise 0, which cuts nothing.
 fn cut(heights: &[Option<u32>], columns: usize) -> u32 {
     let rows = heights.len() / columns;
     let outside = |row: usize, column: usize| {

@@ -75,8 +75,8 @@ impl Report {
         self.answers.push(text.into());
     }
 
-    /// Adds a caution with the remedy of its kind, which is empty for what the guide does not list. A
-    /// caution appears on the page once.
+    /// Adds a caution with the remedy of its kind, which is empty if the guide does not list the
+    /// kind. A caution appears on the page once.
     pub(crate) fn caution(&mut self, text: impl Into<String>, kind: &str) {
         let caution = [text.into(), remedy(kind).to_owned()];
         if !self.cautions.contains(&caution) {
@@ -107,7 +107,7 @@ impl Report {
         };
         self.surfaces.push(format!(
             "<canvas class=\"surface\" tabindex=\"0\" width=\"900\" height=\"600\" \
-             data-relief='{}'></canvas><figcaption>{}: {} mm high. The mouse turns it</figcaption>",
+             data-relief='{}'></canvas><figcaption>{}: {} mm high. Drag to rotate</figcaption>",
             json!(relief),
             escaped(title),
             four_digits(relief.height_mm),

@@ -1,4 +1,4 @@
-//! Slopes of a surface from two files or a normal map, and whether they are those of one surface.
+//! Slopes from two files or a normal map, with a test that they belong to one surface.
 use crate::arguments::same_shape;
 use crate::console::Context;
 use crate::failure::Failure;
@@ -7,21 +7,22 @@ use serde_json::json;
 use std::path::Path;
 use tactile_files::io::{read_grid, read_normal_map};
 
-/// Blocks along the shorter side whose mean slopes are compared: few enough that noise is averaged
-/// away, and enough that a bump of a tenth of the side stays one.
+/// Number of blocks along the shorter side whose mean slopes are compared. It is small enough to
+/// average noise, and large enough to resolve a bump of a tenth of the side.
 const BLOCKS: usize = 32;
 
-/// Share of their closure that slopes leave in another order or with another sign if that is the
-/// right one. Noise alone leaves all of it.
+/// Slopes in another order or with another sign are taken as right if they reduce the closure error
+/// below this share. Noise alone does not reduce it.
 const CLEARLY_LESS: f64 = 0.5;
 
-/// A normal is flatter than this (z over its length) on no surface that is seen.
+/// Smallest z component of a unit normal. No visible surface is steeper.
 const FLATTEST: f64 = 0.02;
 
-/// Slopes along x and along y.
+/// Slopes along x and y.
 pub(crate) type Slopes = [Array2<f64>; 2];
 
-/// Reads slopes, with what their own integrability shows to be wrong.
+/// Reads slopes and gives a caution if they cannot be integrated but would be in another order or
+/// with another sign.
 pub(crate) fn read(
     path: &Path,
     q: Option<&Path>,
@@ -58,7 +59,8 @@ pub(crate) fn read(
     Ok(slopes)
 }
 
-/// Slopes of the normals n: −n_x/n_z and, as rows count downwards, n_y/n_z where y points up.
+/// Slopes from normals n: −n_x/n_z and −n_y/n_z, or n_y/n_z if y points up, because rows are
+/// counted downwards.
 fn normal_map(path: &Path, pixel: [f64; 2], context: &mut Context) -> Result<Slopes, Failure> {
     let normals = read_normal_map(path)?;
     let slope = |normals: &Array3<f64>, axis: usize| {
@@ -66,7 +68,7 @@ fn normal_map(path: &Path, pixel: [f64; 2], context: &mut Context) -> Result<Slo
         Array2::from_shape_fn((rows, columns), |(row, column)| {
             let [x, y, z] = [0, 1, 2].map(|k| normals[[row, column, k]]);
             let length = (x * x + y * y + z * z).sqrt();
-            // Black, grey and white stand for no normal.
+            // Black, grey and white are not normals.
             let is_normal = (0.5..1.5).contains(&length) && z > FLATTEST * length;
             if is_normal {
                 -normals[[row, column, axis]] / z
@@ -99,7 +101,8 @@ fn normal_map(path: &Path, pixel: [f64; 2], context: &mut Context) -> Result<Slo
     Ok([p, q])
 }
 
-/// Root mean square of the height that a way around a square of blocks gains: none on a surface.
+/// Root mean square of the height difference along a closed path around a square of blocks. It is
+/// zero on a surface.
 fn closure(p: &Array2<f64>, q: &Array2<f64>, [width, height]: [f64; 2]) -> f64 {
     let side = (p.nrows().min(p.ncols()) / BLOCKS).max(1);
     let (rows, columns) = (p.nrows() / side, p.ncols() / side);

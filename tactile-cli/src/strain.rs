@@ -1,4 +1,4 @@
-//! `tactile strain`: from two sets of points, before and after a deformation.
+//! `tactile strain`: strain between two sets of points, before and after a deformation.
 use self::grid::{Known, StrainGrid, arrays};
 use crate::arguments::{PointFrame, PointFrames, TableArguments};
 use crate::console::Context;
@@ -27,28 +27,28 @@ mod series;
 
 /// Match the points of two frames or more and measure the strain between them
 ///
-/// The files are CSV, a point per row: columns x, y and, in space, z, found by name where there is a
-/// header. Points may come and go. An affine and a smooth field beside noise, weighed by their
-/// likelihood, give the strain. Misplaced points are found and left out. Pairs that are not to be
-/// relied on
-/// give no strain.
+/// The files are CSV with one point per row: columns x, y and, in space, z, found by name if there
+/// is a header. Points may appear and disappear. The deformation is an affine map with a smooth
+/// field, estimated together with the noise. Misplaced points are found and left out. Unreliable
+/// pairs give no strain.
 ///
-/// --out gets pairs.csv (rows, positions and displacements of the pairs), strain.csv (at every point
-/// the strain, displacement gradient, rotation, principal strains and their directions n1, n2, area
-/// or volume ratio and von Mises' equivalent strain, each with its standard error), strain.npz (the
-/// same for NumPy, with row_before, points and displacement) and strain.svg (maps over the points, of a
-/// volume over the middle of z). With --grid there are also grid.csv, grid.vtk (for ParaView) and
-/// grid.npz (axes z, y, x): displacement, strain and standard error on a grid over the box of the
-/// points before. Far from the pairs the errors grow.
+/// --out gets pairs.csv (rows, positions and displacements of the pairs) and strain.csv (at every
+/// point the strain, displacement gradient, rotation, principal strains with their directions n1
+/// and n2, area or volume ratio and von Mises equivalent strain, each with its standard error). It
+/// also gets strain.npz (the same for NumPy, with row_before, points and displacement) and
+/// strain.svg (maps over the points; for a volume, over the middle of z). With --grid it gets
+/// grid.csv, grid.vtk (for ParaView) and grid.npz (axes z, y, x): displacement, strain and standard
+/// error on a grid over the box of the points before. The errors grow with the distance from the
+/// pairs.
 ///
-/// Known pairs, as of finite elements, image correlation or a tracker, are not matched: with --paired
-/// row i of one file is row i of the other, and one file alone has displacements u, v (and w) beside
-/// x, y (and z). Rows with nan or an empty cell are skipped.
+/// Known pairs, for example from finite elements, image correlation or a tracker, need no matching.
+/// With --paired, row i of one file corresponds to row i of the other. A single file must have
+/// displacements u, v (and w) beside x, y (and z). Rows with nan or an empty cell are skipped.
 ///
-/// Three files and more are followed from frame to frame. The strain is then that of the last frame
-/// since the first, found where a direct match is not, and --out also gets tracks.csv (every point
-/// of every track: frame from 1, row from 0 and position) and series.csv (strain of every step and
-/// since the first frame).
+/// The points of three or more files are followed from frame to frame. The strain is then that of
+/// the last frame relative to the first, even if these two cannot be matched directly. --out also
+/// gets tracks.csv (every point of every track: frame from 1, row from 0 and position) and
+/// series.csv (strain of every step and relative to the first frame).
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -59,20 +59,20 @@ Examples:
       --out target/series
   tactile strain --paired examples/data/sources.csv examples/data/targets.csv")]
 pub(crate) struct StrainArguments {
-    /// Points of the frames in their order: before and after, or more. Or one table, with
-    /// displacements or with a column of frames (TrackMate, trackpy).
+    /// Points of the frames in order: before and after, or more. Alternatively one table with
+    /// displacements or with a column of frame numbers (TrackMate, trackpy).
     #[arg(required = true, num_args = 1.., value_name = "FRAMES")]
     frames: Vec<PathBuf>,
-    /// Measure of strain.
+    /// Strain measure.
     #[arg(long, value_enum, default_value_t = Measure::GreenLagrange)]
     measure: Measure,
     /// Row i of the second file is row i of the first: no matching.
     #[arg(long)]
     paired: bool,
-    /// Spacing of a grid to write displacement and strain on, in the points' unit.
+    /// Spacing of the grid for displacement and strain, in the unit of the points.
     #[arg(long, value_name = "SPACING")]
     grid: Option<f64>,
-    /// Give the strain of doubtful pairs too, its doubt beside it.
+    /// Also print the strain of doubtful pairs, with a caution.
     #[arg(long)]
     doubtful_pairs: bool,
     #[command(flatten)]
@@ -102,7 +102,7 @@ impl Measure {
     }
 }
 
-/// The unit of points whose headings name one.
+/// The unit of points if their headings state one.
 const METRES: &str = "m";
 
 const FILES: [&str; 4] = ["pairs.csv", "strain.csv", "strain.npz", "strain.svg"];
@@ -164,13 +164,13 @@ pub(crate) fn run(arguments: &StrainArguments, context: &mut Context) -> Result<
         [_, 0] => answer(plane, empty, unit, known, arguments, context),
         [0, _] => answer(space, empty, unit, known, arguments, context),
         _ => Err(Failure::input(format!(
-            "{} and the frames after it must all have two coordinates a point, or three",
+            "{} and the frames after it must all have two coordinates per point, or three",
             paths[0].display()
         ))),
     }
 }
 
-/// Points of a frame, its number from 1 among all that were given, and its name.
+/// Points of a frame, its number from 1 among all given frames, and its name.
 struct Frame<const D: usize> {
     number: usize,
     name: String,
@@ -189,8 +189,8 @@ impl StrainArguments {
     }
 }
 
-/// The strain between two frames or along a series of which so many are empty, its report and its
-/// files.
+/// The strain between two frames or along a series, with its report and its files. `empty` is the
+/// number of empty frames.
 fn answer<const D: usize>(
     mut frames: Vec<Frame<D>>,
     empty: usize,
@@ -259,22 +259,22 @@ fn answer<const D: usize>(
     Ok(Exit::complete_if(report.complete))
 }
 
-/// The strain of a call and what it comes from, as far as it came.
+/// The strain of a call with its input. Fields that are not yet known are empty.
 struct StrainReport<const D: usize> {
     before: Vec<Point<f64, D>>,
     after: Vec<Point<f64, D>>,
     /// Pairs of the matcher.
     matched: Vec<(usize, usize)>,
     strain: Result<StrainBetween<D>, String>,
-    /// The frames of a series.
+    /// The frames of a series, as JSON.
     frames: Option<Value>,
-    /// Whether all was found.
+    /// Whether all results are available.
     complete: bool,
     measure: &'static str,
     unit: &'static str,
 }
 
-/// The strain between two frames, of pairs that are known row by row or matched. None after Ctrl-C.
+/// The strain between two frames, from pairs known row by row or matched. `None` after Ctrl-C.
 fn between<const D: usize>(
     before: Frame<D>,
     after: Frame<D>,
@@ -324,7 +324,7 @@ fn between<const D: usize>(
     }
     let job = format!("fitting {} pairs", matched.len());
     let (from, to, options) = (before.clone(), after.clone(), arguments.options());
-    // Ctrl-C during the fit leaves the pairs, which took the longest.
+    // Ctrl-C during the fit keeps the pairs, which took longest to find.
     let found = context.wait(job, move || {
         let found = match &matching {
             Some(matching) => StrainBetween::of_matching(&from, &to, matching, &options),
@@ -374,7 +374,7 @@ fn strain_cells<const D: usize>(
     of(*strain).chain(of(*error))
 }
 
-/// Number of pairs that were left out of the deformation.
+/// Number of pairs that were left out of the fit.
 fn left_out<const D: usize>(found: &StrainBetween<D>) -> usize {
     (0..found.rows.len()).filter(|&k| !found.is_kept(k)).count()
 }
@@ -404,12 +404,12 @@ impl<const D: usize> StrainReport<D> {
         }
     }
 
-    /// The pairs that the strain comes from, those of the matcher where there is no strain.
+    /// The pairs used for the strain, or those of the matcher if there is no strain.
     fn rows(&self) -> &[(usize, usize)] {
         self.strain.as_ref().map_or(&self.matched, |s| &s.rows)
     }
 
-    /// Headings of coordinates with their unit, where it is known.
+    /// Headings of coordinates, with their unit if it is known.
     fn headings(&self, before: &str, after: &str) -> Vec<String> {
         let unit = if self.unit == METRES { "_m" } else { "" };
         let axes = ["x", "y", "z"][..D].iter();
@@ -572,7 +572,7 @@ impl<const D: usize> StrainReport<D> {
         csv.into_bytes()
     }
 
-    /// Displacement and strain as maps over the points, of a volume over its middle slice.
+    /// Displacement and strain as maps over the points. A volume is drawn at its middle slice.
     fn page(&self, found: &StrainBetween<D>) -> Page {
         let unit = self.unit;
         let flat = |p: &Point<f64, D>| [p[0], p[1]];
@@ -619,8 +619,8 @@ impl<const D: usize> StrainReport<D> {
     }
 }
 
-/// The pairs that a page shows: of a volume the quarter in the middle of z, and no more than can be
-/// told apart in a picture.
+/// The pairs on a page: of a volume only the middle quarter along z, and not more than a picture
+/// can resolve.
 fn shown_pairs<const D: usize>(found: &StrainBetween<D>) -> Vec<usize> {
     let mut rows: Vec<usize> = (0..found.pairs.len()).collect();
     if D == 3 {

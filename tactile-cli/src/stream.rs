@@ -40,7 +40,7 @@ use tactile_simulate::{LoadCycle, PressLoad, PressOptions, Trial};
 /// the other, as fast as possible. A frame is then late if its measurement takes longer than the
 /// duration of a frame at --rate. --out gets stream.csv, with one row per frame. With --json each
 /// frame is a line when it is measured, and the last line is the whole result (JSON Lines). Instead
-/// of the scene, the sensor file of a gel under coloured light may be given with its frames, for
+/// of the scene, the sensor file of a gel lit in colours may be given with its frames, for
 /// force, contact and depth.
 #[derive(Args)]
 #[command(after_help = "\
@@ -79,8 +79,8 @@ pub(crate) struct StreamArguments {
     #[arg(long, value_name = "PERCENT", default_value_t = 0.0, value_parser = not_negative)]
     allowed_late: f64,
     /// Record the frames to this file, and their results next to it as FILE.csv. The recorded file
-    /// gives the same results again. It is a video, or a sequence of PPM images for a gel under
-    /// coloured light.
+    /// gives the same results again. It is a video, or a sequence of PPM images for a gel lit in
+    /// colours.
     #[arg(long, value_name = "FILE.y4m")]
     record: Option<PathBuf>,
     /// Show frame, force, modulus and surface live in browsers. An address that is reachable from

@@ -32,10 +32,10 @@ fn within<'a>(
 
 /// Integrate slopes to heights
 ///
-/// P contains the slopes ∂z/∂x (along a row) and Q the slopes ∂z/∂y (down the rows), as matrices of
-/// the shape of the image (CSV without a header, NPY, NPZ, MAT). P alone is a normal map: an image
-/// of 8 or 16 bits, or an array of shape (rows, columns, 3). The mean height is 0 unless heights
-/// are known. --out gets heights.csv and heights.svg.
+/// P contains the slopes ∂z/∂x (along a row) and Q the slopes ∂z/∂y (down the rows). Both are
+/// matrices with the shape of the image (CSV without a header, NPY, NPZ, MAT). P alone is a normal
+/// map: an image of 8 or 16 bits, or an array of shape (rows, columns, 3). The mean height is 0
+/// unless heights are known. --out gets heights.csv and heights.svg.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -243,7 +243,7 @@ fn stop_reason(stop: StopReason) -> &'static str {
         StopReason::Direct => "solved directly",
         StopReason::Converged => "converged",
         StopReason::IterationLimit => "stopped at the limit of iterations",
-        StopReason::Stagnated => "stopped where nothing improved any more",
+        StopReason::Stagnated => "stopped because the residual no longer decreased",
         StopReason::Cancelled => "stopped by Ctrl-C",
         _ => "stopped",
     }

@@ -108,7 +108,7 @@ pub(crate) fn run(arguments: &WarpArguments, context: &mut Context) -> Result<Ex
             PointTable::Space(q),
         ] => with_kernel(arguments, context, [a, b, q]),
         _ => Err(Failure::input(format!(
-            "{sources}, {targets} and {queries} must all have two coordinates a point, or all \
+            "{sources}, {targets} and {queries} must all have two coordinates per point, or all \
                  three"
         ))),
     }
@@ -221,7 +221,7 @@ fn warp<const D: usize, K: Kernel>(
         .add("warped.csv", table(&values[..warped], &jacobians[..warped]));
     if !report.converged() {
         context.note(
-            "the iteration was stopped before it reached its tolerance; the residual says how far \
+            "the iteration was stopped before it reached its tolerance; the residual shows how far \
              it came",
         );
     }

@@ -13,8 +13,8 @@
 //! first surface would transfer their whole force across the kink at once, and Newton's method
 //! would cycle. Pieces that grow and shrink transfer it continuously.
 //!
-//! The module also contains the search of closest points on a surface's edges, the gaps with their
-//! derivatives, and the selection of contact nodes that touch or may touch within a load step.
+//! The module also finds closest points on a surface's edges, computes gaps with their derivatives,
+//! and selects contact nodes that touch or may touch within a load step.
 
 use crate::element::quadratic;
 use crate::material::Kinematics;

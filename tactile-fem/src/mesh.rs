@@ -1,5 +1,6 @@
-//! Mapped meshes of nine-node quadrilaterals in the half plane (r, z), for bodies that touch a
-//! sensor, and for a tissue block with a spherical inclusion under the flat face of a guide.
+//! Mapped meshes of nine-node quadrilaterals in the half plane (r, z). They are made for bodies
+//! that touch a sensor, and for a tissue block with a spherical inclusion under the flat face of a
+//! guide.
 
 use crate::spacing::{arc_fractions, graded, graded_up_to, grow, with_middles};
 use std::collections::BTreeMap;

@@ -20,8 +20,8 @@ use std::sync::Arc;
 const STICK_FIRST_STEP: f64 = 0.002;
 
 /// Growth of the approach per step for sticking surfaces: the time of touching within a step is
-/// unknown. With 1.2, the force of a ball depends on earlier loads by a thousandth and its contact
-/// radius by four thousandths; with this value, by less than half of that (test
+/// unknown. With 1.2, earlier loads change the force of a ball by a thousandth and its contact
+/// radius by four thousandths. With this value the changes are less than half as large (test
 /// `more_loads_on_the_way_change_little`).
 const STICK_GROWTH: f64 = 1.1;
 

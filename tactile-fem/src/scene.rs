@@ -112,9 +112,9 @@ impl FemScene {
     /// examples.
     ///
     /// # Errors
-    /// An error for lengths that are not positive, for a block no wider than the guide, and for an
-    /// inclusion that is not inside the block, not narrower than the guide, or below a fiftieth of
-    /// its radius.
+    /// An error if a length is not positive or the block is no wider than the guide. The inclusion
+    /// must lie inside the block, be narrower than the guide and be at least a fiftieth of the
+    /// guide's radius.
     pub fn block_under_guide(
         block: &Block,
         guide: &Guide,

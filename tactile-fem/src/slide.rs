@@ -9,7 +9,7 @@
 //! The pressure acts along the axis: its radial component p dz/dr on the slightly bent face is
 //! neglected. CalculiX with faces tied in the same way agrees (`evidence/inclusion_scenes.py`, the
 //! test `inclusion::against_calculix`). With contact pairs, whose pressure is normal to the bent
-//! face, CalculiX's forces and pressures are lower by 0.3 % at a thirtieth of the block's height
+//! face, CalculiX gives lower forces and pressures: by 0.3 % at a thirtieth of the block's height,
 //! and by about 2 % at a tenth. The search does not take this into account.
 
 use crate::model::ElementModel;
@@ -158,8 +158,9 @@ impl FemScene {
         self.shifted(&shifts, depth_m)
     }
 
-    /// This scene with nodes of the upper body moved along r: at the surface by the second value of
-    /// `shifts` at the first, by zero at `depth_m` and at the outer side, and linearly in between.
+    /// This scene with nodes of the upper body moved along r. At the surface the shift is the
+    /// second value of `shifts` at the radius of the first. It falls linearly to zero at `depth_m`
+    /// and at the outer side.
     fn shifted(&self, shifts: &[[f64; 2]], depth_m: f64) -> Option<Self> {
         let mut scene = self.clone();
         let model = &mut scene.model;
@@ -195,8 +196,8 @@ impl FemScene {
 
 /// Fraction of its distance by which the node of each pair is moved: a secant step, pair by pair.
 ///
-/// On a smooth face, a move by δ changes a distance by −δ. At the rim, where the move also changes
-/// the pressure, the change is larger, by a factor of two at a tenth of the block's height: full
+/// On a smooth face, a move by δ changes a distance by −δ. At the rim the move also changes the
+/// pressure, and the change is larger, by a factor of two at a tenth of the block's height. Full
 /// steps would never converge.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Relaxation {

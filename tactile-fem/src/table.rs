@@ -7,8 +7,8 @@ use tactile_elasticity::contact::{Bond, ContactCurve, ContactTable, Waveguide};
 use tactile_elasticity::laws::{ContactLaw, ContactLength, WaveguideLaw};
 use tactile_elasticity::{ElasticityError, Quantity};
 
-/// If the force has grown with a higher power of the radius than this since the previous contact,
-/// the ball has sunk in to its equator, and the contact is the last of its curve. Polynomials that
+/// Highest power of the radius with which the force may grow between two contacts. Above it the
+/// ball has sunk in to its equator, and the contact is the last of its curve. Polynomials that
 /// follow the bend there would have errors of 2 % of the force everywhere instead of 0.6 %.
 const STEEPEST: f64 = 6.0;
 
@@ -116,9 +116,9 @@ const GUIDE_RADIUS: [f64; 2] = [4.0, 2.5];
 /// ball of 25 kPa on a stiffer guide does not converge.
 const LARGEST_POISSON_RATIO: f64 = 0.499;
 
-/// Computes a table by finite elements at finite strain, without friction, for a neo-Hookean ball
-/// of radius R (m) and Poisson ratio ν on neo-Hookean layers bonded to rigid glass, or on a rigid
-/// flat. ν above 0.499 is computed as 0.499.
+/// Computes a table by finite elements at finite strain, without friction. The ball of radius R (m)
+/// and Poisson ratio ν is neo-Hookean. It is pressed on neo-Hookean layers bonded to rigid glass,
+/// or on a rigid flat. ν above 0.499 is computed as 0.499.
 ///
 /// `progress` is called before each modulus and after the last, and ends the computation with
 /// [`ControlFlow::Break`]. Contacts that the solver does not reach are skipped:

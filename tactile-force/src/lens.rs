@@ -102,9 +102,9 @@ impl LensGeometry {
     /// Sets radial distortion [k₁, k₂] about a centre [x, y], normalised by `radius_px`.
     ///
     /// # Errors
-    /// An error for a centre or coefficient that is not finite, a radius that is not positive, or a
-    /// distortion that folds the image inside the radius: 1 + 3k₁ρ² + 5k₂ρ⁴ must be positive up to
-    /// ρ = 1.
+    /// An error if a centre or coefficient is not finite, if a radius is not positive, or if the
+    /// distortion folds the image inside the radius: 1 + 3k₁ρ² + 5k₂ρ⁴ must be positive up to ρ =
+    /// 1.
     pub fn with_distortion(
         mut self,
         centre_px: [f64; 2],

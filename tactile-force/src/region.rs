@@ -306,11 +306,11 @@ pub(crate) struct NoiseWorkspace {
 /// Number of absolute responses of the second-difference filter, in integer grey levels.
 const RESPONSES: usize = 4081;
 
-/// Gain of the noise: variance of the pixels brighter than half the peak, by their second
-/// differences in both directions (like the reference's own noise, see [`crate::NoiseModel`]),
-/// minus that of the background, over their mean. The edge, where the signal itself bends, is
-/// darker and not included. For a large contact every n-th row and column is enough: 8 000 pixels
-/// determine a variance to 2 %, and a standard error to half of that.
+/// Gain of the noise: the variance of the pixels brighter than half the peak, minus that of the
+/// background, over their mean. The variance comes from second differences in both directions, like
+/// the noise of the reference (see [`crate::NoiseModel`]). The edge, where the signal itself bends,
+/// is darker and not included. For a large contact every n-th row and column is enough: 8 000
+/// pixels determine a variance to 2 %, and a standard error to half of that.
 pub(crate) fn gain(
     region: &Region,
     workspace: &mut NoiseWorkspace,

@@ -1,4 +1,4 @@
-//! Accuracy of gels under coloured light, on scenes with exactly known results.
+//! Accuracy of gels lit in colours, on scenes with exactly known results.
 //!
 //! `cargo run --release -p tactile-gel --example exact_worlds -- [WORLDS] [FIRST SEED]` renders
 //! contacts of 10 to 80 px with slopes from 0.03 to 1.2, on a half-space and on a bonded layer,

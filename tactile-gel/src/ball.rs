@@ -1,11 +1,12 @@
-//! What the light reveals about the pressed ball: its size, and whether the face is a sphere or a
+//! Estimates the size of the pressed ball from the light, and whether the face is a sphere or a
 //! paraboloid.
 //!
 //! For a matt face far from shadows, the level of a channel is linear in the unit normal. The third
-//! component of the normal follows from the other two: for a sphere 1 − n_z is (s r)²/2 + (s
-//! r)⁴/8 + …, where s is the factor by which the ball is smaller than stated. The ratio of both
-//! terms gives s. A frame simulated from Hertz's law shows a paraboloid. Real gels are not
-//! perfectly matt, so the evidence counts only if the linear law leaves small residuals.
+//! component of the normal follows from the other two. For a sphere
+//! 1 − n_z is (s r)²/2 + (s r)⁴/8 + …, where s is the factor by which the ball is smaller than
+//! stated. The ratio of both terms gives s. A frame simulated from Hertz's law shows a paraboloid.
+//! Real gels are not perfectly matt, so the evidence counts only if the linear law leaves small
+//! residuals.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -129,7 +129,7 @@ impl GelForce {
     }
 
     /// Total force and moments of all contacts. F_z = ∫p dA, M_x = ∫p y dA and M_y = −∫p x dA come
-    /// from the shape of the face; F_x, F_y and M_z come from the markers ([`MarkerField::shear`],
+    /// from the shape of the face. F_x, F_y and M_z come from the markers ([`MarkerField::shear`],
     /// with G/h of the layer). `None` without contact.
     pub fn wrench(&self, frame: &GelFrame, markers: Option<&MarkerField>) -> Option<GelWrench> {
         let pressed = self.pressed(frame)?;

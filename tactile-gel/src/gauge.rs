@@ -2,8 +2,8 @@
 //!
 //! Neither the layer nor its modulus needs to be known. The volume V displaced by the face is the
 //! integral of its displacement over the contacts. For bodies of one shape on one gel the force
-//! follows F = c Vᵐ: m = 3/5 for a ball on a half-space by Hertz's law, 1 for a flat punch.
-//! Exponent and factor come from a line through ln V and ln F.
+//! follows F = c Vᵐ. The exponent m is 3/5 for a ball on a half-space by Hertz's law, and 1 for a
+//! flat punch. Exponent and factor come from a line through ln V and ln F.
 
 use tactile_core::{Estimate, Requirement};
 

@@ -15,7 +15,8 @@ const LEAST_TRACKS: usize = 4;
 /// a third of the spacing: further away, a chance coincidence is equally likely.
 const PREDICTED: f64 = 4.0;
 /// A marker slips if it deviates from the rigid motion by this number of standard errors and this
-/// number of pixels, because the gel below the edge of a contact deforms slightly.
+/// number of pixels. The second limit is needed because the gel below the edge of a contact deforms
+/// slightly.
 const SLIP_ERRORS: f64 = 4.0;
 const LEAST_SLIP_PX: f64 = 0.3;
 /// Number of visible markers around a hidden one that assess the field in the gap.
@@ -470,9 +471,9 @@ fn field_through(tracks: &[MarkerTrack]) -> Option<(LocalField<2>, Vec<(usize, b
     Some((field, kept))
 }
 
-/// Error of the field in gaps, in its standard errors but at least 1: the root mean square
-/// deviation from the visible markers next to hidden ones, if those are left out. The field may
-/// behave differently in a gap.
+/// Error of the field in gaps, in its standard errors but at least 1. It is the root mean square
+/// deviation from the visible markers next to hidden ones, if these visible markers are left out.
+/// The field may behave differently in a gap.
 fn gap_error(tracks: &[MarkerTrack]) -> f64 {
     let [hidden, seen] = [false, true].map(|seen| -> Vec<&MarkerTrack> {
         tracks

@@ -17,8 +17,9 @@
 pub struct GelModel {
     /// Size of a pixel on the gel in metres.
     pub pixel_size_m: f64,
-    /// Coefficients of n_x and n_y, 60 each, for the 20 monomials of the differences in units of 50
-    /// grey levels, then for these times x, then times y, with x and y from −1 to 1.
+    /// Coefficients of n_x and n_y, 60 each. The first 20 belong to the monomials of the
+    /// differences in units of 50 grey levels. The others belong to these monomials times x, then
+    /// times y, with x and y from −1 to 1.
     pub coefficients: [Vec<f64>; 2],
     /// Standard error of n_x and n_y, from leaving out one press at a time.
     pub normal_standard_error: f64,

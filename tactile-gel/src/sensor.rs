@@ -27,7 +27,7 @@ const STEEPEST: f32 = 0.97;
 
 /// Minimum noise in grey levels of the difference of two 8-bit frames, from rounding alone.
 const LEAST_NOISE_GREY: f64 = 0.41;
-/// Fraction of a pixel's noise in the smoothed pressure: the blurs by frame, cells and smoothing
+/// Fraction of a pixel's noise in the smoothed pressure. The blurs by frame, cells and smoothing
 /// add up to a variance of 9.25 px², which reduces noise by √(4π · 9.25).
 const SMOOTHED: f64 = 0.093;
 /// Padding of the pressure grid, as a fraction of its size. Periodic copies of a contact decay with

@@ -1,5 +1,5 @@
-//! Simulated frames of a gel lit in colours from three sides, with the truth at each pixel, and
-//! exact faces: a ball on a half-space by Hertz's law, and pressures on a bonded layer.
+//! Simulated frames of a gel lit in colours from three sides, with the truth at each pixel. The
+//! faces are exact: a ball on a half-space by Hertz's law, and pressures on a bonded layer.
 
 use ndarray::{Array2, Array3};
 use rand::SeedableRng;

@@ -43,11 +43,11 @@ struct ModelErrors {
 /// Correlation length of the shape error, relative to the outermost radius.
 const SHAPE_LENGTH: f64 = 0.4;
 
-/// Comparison with CalculiX for bonded blocks with and without an inclusion: all pressures are 0.05
-/// to 0.2 % low; the shape agrees within 0.1 % and is low by 0.05 to 0.3 % towards the rim, with
-/// waves of 0.05 to 0.1 %; forces are 0.1 to 1 % low. The part that grows as the face sinks in is
-/// the difference between meshes with 5 and 10 elements per eighth: 0.1 % at the outermost radius
-/// and 0.3 % of the force.
+/// Comparison with CalculiX for bonded blocks with and without an inclusion. All pressures are 0.05
+/// to 0.2 % low, and forces are 0.1 to 1 % low. The shape agrees within 0.1 % and is low by 0.05 to
+/// 0.3 % towards the rim, with waves of 0.05 to 0.1 %. The part that grows as the face sinks in is
+/// the difference between meshes with 5 and 10 elements per eighth. It is 0.1 % at the outermost
+/// radius and 0.3 % of the force.
 const BONDED: ModelErrors = ModelErrors {
     scale: 2e-3,
     shape: 7e-4,
@@ -60,8 +60,8 @@ const BONDED: ModelErrors = ModelErrors {
     bent: 0.0,
 };
 
-/// Comparison without friction: all pressures are 0.05 to 0.25 % low. The shape agrees within 0.1 %
-/// and is low towards the rim by up to 0.2 % in soft tissue, and by 0.85 % in tissue a third as
+/// Comparison without friction: all pressures are 0.05 to 0.25 % low. The shape agrees within 0.1
+/// %. Towards the rim it is low by up to 0.2 % in soft tissue, and by 0.85 % in tissue a third as
 /// stiff as the guide. Over eight blocks of `evidence/inclusion_scenes.py` the root mean square is
 /// 0.5 %. Four fifths of this disappear if CalculiX's elements at the rim are a quarter as long,
 /// but the data were not computed in that way. On the axis above a shallow inclusion the difference
@@ -162,8 +162,8 @@ pub(crate) struct ObservedCells {
 
 /// Error of the pressure of an off-axis inclusion, relative to its distance from the axis in radii
 /// of the face and to the relative increase of pressure that it causes. Solutions in three
-/// dimensions differ by 0.2 to 0.6 % of the pressure at 0.25 to 0.5 radii, for inclusions that
-/// raise the pressure by a fifth to a factor of three.
+/// dimensions differ by 0.2 to 0.6 % of the pressure at 0.25 to 0.5 radii. Their inclusions raise
+/// the pressure by a fifth to a factor of three.
 const ASIDE: f64 = 0.034;
 
 /// Error of the pressure on a whole face on the scale of the elements, in addition to that of

@@ -69,9 +69,9 @@ impl InclusionSearch {
     /// one solution with derivatives.
     ///
     /// # Errors
-    /// An error for a length, modulus or error that is not positive, approaches that do not
-    /// increase, a number of errors different from that of the rings, or fewer than eight rings
-    /// within reach. Also [`ElasticityError::NoSolution`].
+    /// An error if a length, modulus or error is not positive, if approaches do not increase, if
+    /// the number of errors differs from that of the rings, or if fewer than eight rings are in
+    /// reach. Also [`ElasticityError::NoSolution`].
     pub fn expected_errors(
         &self,
         assumed: &AssumedInclusion,

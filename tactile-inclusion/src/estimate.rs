@@ -267,8 +267,9 @@ impl fmt::Display for InclusionWarning {
     }
 }
 
-/// Warnings about the asymmetric part of a picture: a first harmonic around the axis above 3 %, or
-/// a root mean square of the second to fourth above 0.6 %, both relative to the pressure.
+/// Warnings about the asymmetric part of a picture, relative to the pressure. They are given if the
+/// first harmonic around the axis exceeds 3 %, or the root mean square of the second to fourth
+/// exceeds 0.6 %.
 ///
 /// ```
 /// use tactile_inclusion::asymmetry_warnings;

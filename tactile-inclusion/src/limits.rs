@@ -122,8 +122,8 @@ impl InclusionSearch {
         Ok(limits)
     }
 
-    /// The candidate of `candidates_m` where the next press of a scan searches most: the mean
-    /// volume of the balls that could be hidden under the used part of its face is largest there.
+    /// The position of `candidates_m` at which the next press of a scan searches most. There the
+    /// mean volume of the balls that could be hidden under the used part of the face is largest.
     /// `limits_m` are [`Self::detection_limits`] at `places_m`. In unsearched regions a ball as
     /// wide as the face's radius could be hidden. Among equally good candidates, the one nearest to
     /// the presses of the scan is chosen. `None` if no candidate has any of these positions under

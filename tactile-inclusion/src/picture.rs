@@ -5,12 +5,12 @@
 //!
 //! $$ p(x, y) = p_\mathrm{plain}(r) \frac{p_\mathrm{axial}(\rho)}{p_\mathrm{plain}(\rho)} $$
 //!
-//! This is exact on the axis. Off the axis, the load spreads below the face. Let x and z be the
-//! distances of the lump's centre from the axis and from the face, and s the outward component of
-//! the distance from its apparent position, all in radii of the face. The lump then appears at
-//! x/(1 + k z³), and ρ is this distance times (1 + n (x z)²)(1 + m (1 − 3 x²) x z s). The constants
-//! k, n and m were fitted to blocks with a lump that were solved in three dimensions. The remaining
-//! error grows as the lump approaches the rim, and is part of the covariance.
+//! This is exact on the axis. Off the axis, the load spreads below the face. All lengths are in
+//! radii of the face. Let x and z be the distances of the lump's centre from the axis and from the
+//! face, and s the outward component of the distance from its apparent position. The lump then
+//! appears at x/(1 + k z³), and ρ is this distance times (1 + n (x z)²)(1 + m (1 − 3 x²) x z s).
+//! The constants k, n and m were fitted to blocks with a lump that were solved in three dimensions.
+//! The remaining error grows as the lump approaches the rim, and is part of the covariance.
 
 use crate::parameters::{Coordinate, Parameters, Place};
 use std::sync::Arc;

@@ -70,11 +70,12 @@ const SPREAD: (f64, f64) = (0.13, 0.07);
 /// Finds a spheroidal inclusion in a block from the pressure on a guide's face at several
 /// approaches.
 ///
-/// The maximum a posteriori estimate over ln D, ln d, ln E₁, the height over width of the
-/// inclusion, ln E₀, the block's height, ν and the approach zero is found by Levenberg–Marquardt
-/// with finite-strain finite elements, from several starts. A score test first decides whether an
-/// inclusion would explain more than the homogeneous block. Intervals follow the posterior along ln
-/// E₁. The probability of an inclusion follows from the evidence with and without one.
+/// The maximum a posteriori estimate is found by Levenberg–Marquardt with finite-strain finite
+/// elements, from several starts. The unknowns are ln D, ln d, ln E₁, the height over width of the
+/// inclusion, ln E₀, the block's height, ν and the approach zero. A score test first decides
+/// whether an inclusion would explain more than the homogeneous block. Intervals follow the
+/// posterior along ln E₁. The probability of an inclusion follows from the evidence with and
+/// without one.
 ///
 /// ```no_run
 /// use core::ops::ControlFlow;

@@ -121,7 +121,7 @@ pub(crate) fn frame<'py>(
 pub(crate) fn colours(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array3<u8>> {
     let array = bytes(name, given)?;
     let shape = array.shape().to_vec();
-    let wanted = "three axes (rows, columns, 3) of a gel that is lit in colours";
+    let wanted = "three axes (rows, columns, 3) of a gel lit in colours";
     match *shape.as_slice() {
         [_, _, 3] => array
             .as_array()

@@ -1,4 +1,4 @@
-//! Gels under coloured light, and markers printed on gels, from arrays.
+//! Gels lit in colours, and markers printed on gels, from arrays.
 use crate::arrays::{self, Matrix, kept};
 use crate::errors::{self, TactileError, invalid};
 use crate::results::{Estimate, GelContact, GelReport, Markers, of_values};
@@ -14,7 +14,7 @@ use tactile_imaging::gel::{
 };
 use tactile_imaging::matching::MatchError;
 
-/// A gel under coloured light: from frames to surface, contacts and forces.
+/// A gel lit in colours: from frames to surface, contacts and forces.
 #[pyclass(frozen, module = "tactile_imaging")]
 pub(crate) struct GelSensor {
     gel: CalibratedGel,

@@ -7,8 +7,8 @@
 //! Parameters that the presses do not determine keep their stated values.
 //!
 //! The error of the pixel size enters V and also affects the contacts of the sample. The pixel size
-//! is not updated, but its covariance with x is kept: with the Kalman gain K, the derivatives s of
-//! ln F by ln a and the variance σ² of the size, it is -K s σ² (Schmidt's filter: 1966, Adv.
+//! is not updated, but its covariance with x is kept. It is -K s σ², with the Kalman gain K, the
+//! derivatives s of ln F by ln a and the variance σ² of the size (Schmidt's filter: 1966, Adv.
 //! Control Syst. 3, 293).
 use super::{KnownBall, is_known, is_positive};
 use crate::core::{Estimate, Source};

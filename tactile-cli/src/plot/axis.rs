@@ -1,17 +1,17 @@
-//! Axes that count in equal steps or in decades, and their labels.
+//! Linear and logarithmic axes, and their labels.
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use std::ops::Range;
 
-/// An axis that counts in equal steps or in decades.
+/// A linear or logarithmic axis.
 #[derive(Clone, Debug)]
 pub(super) struct Axis {
-    /// The ends, as decimal logarithms where it is logarithmic.
+    /// The ends, as decimal logarithms if the axis is logarithmic.
     pub(super) ends: [f64; 2],
     pub(super) logarithmic: bool,
     pub(super) down: bool,
 }
 
-/// Smallest and largest finite value. It is (0, 1) where there is none.
+/// Smallest and largest finite value, or (0, 1) if there is none.
 pub(super) fn spread(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let start = [f64::INFINITY, f64::NEG_INFINITY];
     let finite = values.filter(|v| v.is_finite());
@@ -19,11 +19,11 @@ pub(super) fn spread(values: impl Iterator<Item = f64>) -> [f64; 2] {
     if low > high { [0.0, 1.0] } else { [low, high] }
 }
 
-/// The range of colours: not narrower than a thousandth of the values, for else rounding errors
-/// would be shown.
+/// The range of colours. It is at least a thousandth of the values, so that rounding errors are not
+/// visible.
 pub(super) fn value_range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let [low, high] = spread(values);
-    // A homogeneous strain differs in its last bits alone, which the full range of colours would
+    // A homogeneous strain varies only in its last bits, which the full range of colours would
     // exaggerate.
     let least = 1e-3 * low.abs().max(high.abs());
     let more = (0.5 * (least - (high - low))).max(0.0);
@@ -31,8 +31,8 @@ pub(super) fn value_range(values: impl Iterator<Item = f64>) -> [f64; 2] {
 }
 
 impl Axis {
-    /// From the smallest to the largest value, wider by the share `margin` at both ends, and never
-    /// empty.
+    /// An axis from the smallest to the largest value, extended by the share `margin` at both ends.
+    /// It is never empty.
     pub(super) fn around(
         values: impl Iterator<Item = f64>,
         logarithmic: bool,
@@ -55,7 +55,7 @@ impl Axis {
         }
     }
 
-    /// The same axis, counted from the top of the page.
+    /// The same axis, directed downwards on the page.
     pub(super) fn downwards(self) -> Self {
         Self { down: true, ..self }
     }
@@ -64,7 +64,7 @@ impl Axis {
         self.ends[1] - self.ends[0]
     }
 
-    /// Where a value stands between the ends, 0 to 1.
+    /// Position of a value between the ends, from 0 to 1.
     pub(super) fn share(&self, value: f64) -> f64 {
         let value = if self.logarithmic {
             value.log10()
@@ -79,7 +79,7 @@ impl Axis {
         let [low, high] = self.ends;
         let rough = self.length() / wanted.max(1) as f64;
         if self.logarithmic {
-            // Powers of ten, and 2 and 5 times them where these alone are too few.
+            // Powers of ten, and 2 and 5 times these if there are too few.
             let step = rough.ceil().max(1.0);
             let factors: &[f64] = if self.length() > 2.0 {
                 &[1.0]
@@ -98,7 +98,7 @@ impl Axis {
     }
 }
 
-/// The multiples of a step from `low` to `high`, never more than a hundred.
+/// The multiples of a step from `low` to `high`, at most a hundred.
 fn multiples(step: f64, low: f64, high: f64) -> impl Iterator<Item = f64> {
     let first = (low / step - 1e-9).ceil();
     let count = (high / step + 1e-9).floor() - first;
@@ -124,14 +124,14 @@ impl Ranged for Axis {
 }
 
 impl ValueFormatter<f64> for Axis {
-    /// All numbers of a linear axis share one power of ten, so that they compare at a glance.
+    /// All numbers on a linear axis share one power of ten, so that they are easy to compare.
     fn format_ext(&self, value: &f64) -> String {
         let largest = self.ends[0].abs().max(self.ends[1].abs());
         if self.logarithmic {
             return label(*value, 0.0);
         }
         if largest == 0.0 || (0.01..1e5).contains(&largest) {
-            // As many decimals as tell one tick from the next.
+            // Enough decimals to distinguish neighbouring ticks.
             let step = self.length() / 10.0;
             return label(*value, -step.log10().floor());
         }
@@ -143,10 +143,10 @@ impl ValueFormatter<f64> for Axis {
     }
 }
 
-/// A number of at least four digits and these decimals, as short as it can be read: 0.25, 1200,
-/// 3×10⁶.
+/// A number with at least four digits and this number of decimals, in its shortest form: 0.25,
+/// 1200, 3×10⁶.
 pub(super) fn label(value: f64, decimals: f64) -> String {
-    // Steps such as 0.1 leave rounding errors on values that are zero.
+    // Steps such as 0.1 leave rounding errors on values that should be zero.
     let size = value.abs();
     if size < 1e-12 {
         return "0".into();
@@ -165,7 +165,7 @@ pub(super) fn label(value: f64, decimals: f64) -> String {
     format!("{mantissa}×10{}", superscript(power))
 }
 
-/// Without zeros behind the decimal point.
+/// The number without trailing zeros after the decimal point.
 fn short(text: String) -> String {
     if text.contains('.') {
         let text = text.trim_end_matches('0').trim_end_matches('.');

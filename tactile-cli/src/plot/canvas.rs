@@ -1,4 +1,4 @@
-//! The drawing library's canvas, its text and its strokes.
+//! The canvas of the drawing library, its text and its strokes.
 use crate::text::printable;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use plotters::prelude::*;
@@ -8,11 +8,11 @@ use std::error::Error;
 pub(super) type Drawn<T> = Result<T, Box<dyn Error + Send + Sync>>;
 pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 
-/// The drawing library counts in whole pixels, which shows as steps in curves: it draws on a canvas
-/// this many times as fine.
+/// Refinement of the canvas. The drawing library uses whole pixels, which would be visible as steps
+/// in curves.
 pub(super) const FINE: i32 = 4;
 
-/// What is drawn by `inside` on an area of this size, as an element of a page.
+/// Draws with `inside` on an area of this size and returns it as an element of a page.
 pub(super) fn drawing(
     [x, y]: [i32; 2],
     [width, height]: [i32; 2],
@@ -25,7 +25,7 @@ pub(super) fn drawing(
         inside(&area)?;
         area.present()?;
     }
-    // The outer size turns the fine canvas back into pixels of the page.
+    // The outer size scales the fine canvas to pixels of the page.
     let fine = format!(r#"<svg width="{fine_width}" height="{fine_height}""#);
     let placed = format!(r#"<svg x="{x}" y="{y}" width="{width}" height="{height}""#);
     Ok(svg.replacen(&fine, &placed, 1))
@@ -40,7 +40,7 @@ pub(super) fn picture([x, y]: [f64; 2], [width, height]: [f64; 2], png: &[u8]) -
     )
 }
 
-/// A font of this height in pixels of the page.
+/// A font with this height in pixels of the page.
 pub(super) fn font(size: i32) -> TextStyle<'static> {
     // The SVG back end divides the size by 1.24.
     ("sans-serif", 1.24 * f64::from(FINE * size))

@@ -1,8 +1,8 @@
 //! Pages of panels in rows and columns, and the layers of a panel.
 //!
-//! A page is one self-contained SVG file of panels in rows and columns. A panel is a set of axes
-//! with layers in them. Heat maps take perceptually uniform colours and have a colour bar, lines
-//! and points the colours of Okabe and Ito.
+//! A page is one self-contained SVG file with panels in rows and columns. A panel is a set of axes
+//! with layers. Heat maps use perceptually uniform colours and have a colour bar. Lines and points
+//! use the colours of Okabe and Ito.
 use super::axis::{Axis, value_range};
 use super::canvas::{Area, Drawn, FINE, axis_style, drawing, font, picture, stroke, text};
 use crate::text::printable;
@@ -17,7 +17,7 @@ use std::io::Cursor;
 use std::ops::Range;
 use tactile_imaging::pipeline::PipelineError;
 
-/// Why a page could not be drawn.
+/// The reason why a page could not be drawn.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum PlotError {
     /// A page could not be drawn.
@@ -44,7 +44,7 @@ impl<T: IntoIterator<Item = PlotPoint>> Places for T {}
 pub(crate) trait Ends: IntoIterator<Item = [PlotPoint; 2]> {}
 impl<T: IntoIterator<Item = [PlotPoint; 2]>> Ends for T {}
 
-/// Colours that people with any colour vision tell apart (Okabe and Ito 2008), and two neutral
+/// Colours that can be distinguished with any colour vision (Okabe and Ito 2008), and two neutral
 /// ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Colour {
@@ -59,7 +59,7 @@ pub(crate) enum Colour {
 }
 
 impl Colour {
-    /// The colour of the `k`-th of several equal things.
+    /// The colour of the `k`-th of several similar items.
     pub(crate) fn category(k: usize) -> Self {
         let order = [Self::Blue, Self::Orange, Self::Green, Self::Red];
         [&order[..], &[Self::Purple, Self::Sky]].concat()[k % 6]
@@ -86,14 +86,14 @@ pub(crate) struct HeatMap {
     /// Outer edges of the first and the last cell along x and y.
     edges: [[f64; 2]; 2],
     range: [f64; 2],
-    /// A frame of a camera, drawn from black to white.
+    /// Whether it is a camera frame, drawn from black to white.
     grey: bool,
     label: String,
 }
 
 impl HeatMap {
-    /// Cells of `pixel_size` (x, y). The centre of the first one is the origin, the label names the
-    /// values with their unit.
+    /// A map with cells of `pixel_size` (x, y). The centre of the first cell is the origin. The
+    /// label names the values with their unit.
     pub(crate) fn of_pixels(
         values: ArrayView2<'_, f64>,
         pixel_size: [f64; 2],
@@ -132,7 +132,7 @@ impl HeatMap {
     fn png(&self, size: [f64; 2], upwards: bool) -> Result<Vec<u8>, image::ImageError> {
         let [width, height] = size.map(|pixels| pixels.round().max(1.0) as u32);
         let (rows, columns) = self.values.dim();
-        // At least one cell, also where the page has more pixels than the map has cells.
+        // At least one cell, even if the page has more pixels than the map has cells.
         let cells = |i: u32, pixels: u32, n: usize| -> Range<usize> {
             let edge = |i: u32| (f64::from(i) * n as f64 / f64::from(pixels)) as usize;
             let start = edge(i).min(n.saturating_sub(1));
@@ -194,7 +194,7 @@ struct Layer {
     label: String,
 }
 
-/// One set of axes and what is drawn in it.
+/// One set of axes with its layers.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Panel {
     title: String,
@@ -207,7 +207,7 @@ pub(crate) struct Panel {
 }
 
 impl Panel {
-    /// Axes with their labels: write the units into them.
+    /// A panel with the labels of its axes, which should state the units.
     pub(crate) fn new(
         title: impl Into<String>,
         x: impl Into<String>,
@@ -301,8 +301,8 @@ impl Panel {
         self
     }
 
-    /// The axes, a little wider than the data but around heat maps, of which no cell may be cut
-    /// off.
+    /// The axes, slightly wider than the data. Around heat maps they end exactly at the outer
+    /// cells.
     fn axes(&self) -> [Axis; 2] {
         let heat = |layer: &Layer| matches!(layer.marks, Marks::Heat(_));
         let margin = if self.layers.iter().any(heat) {
@@ -318,7 +318,7 @@ impl Panel {
 }
 
 impl Layer {
-    /// Every position that must be inside the axes.
+    /// All positions that must lie inside the axes.
     fn places(&self) -> Vec<PlotPoint> {
         match &self.marks {
             Marks::Discs(at) | Marks::Rings(at) | Marks::Valued(at, _) => at.clone(),
@@ -377,7 +377,7 @@ impl Page {
 "#,
             size[0], size[1]
         );
-        // Every part is an element of its own, so that a panel draws without knowing the page.
+        // Every part is a separate element, so that a panel can be drawn independently of the page.
         svg += &drawing([0, 0], [size[0], head], |area| {
             text(area, &self.title, [size[0] / 2, head / 2], 20, HPos::Center)
         })?;
@@ -451,7 +451,7 @@ impl Panel {
         self.layers.iter().find_map(with_bar)
     }
 
-    /// The panel in the area with this corner and size, in pixels of the page.
+    /// Draws the panel in the area with this corner and size, in pixels of the page.
     fn draw(&self, corner: [i32; 2], size: [i32; 2]) -> Drawn<String> {
         if !self.text.is_empty() {
             return drawing(corner, size, |area| self.draw_text(area, size));
@@ -473,7 +473,7 @@ impl Panel {
         Ok(pictures + &lines)
     }
 
-    /// Heat maps and the colours of the bar.
+    /// Draws heat maps and the colours of the bar.
     fn pictures(&self, axes: &[Axis; 2], layout: &Layout, corner: [i32; 2]) -> Drawn<String> {
         let mut svg = String::new();
         let on_page = |at: [i32; 2]| [0, 1].map(|k| f64::from(corner[k] + at[k]));
@@ -499,7 +499,7 @@ impl Panel {
         Ok(svg)
     }
 
-    /// Axes, and all layers but heat maps.
+    /// Draws the axes and all layers except heat maps.
     fn draw_layers(&self, area: &Area<'_>, axes: &[Axis; 2], layout: &Layout) -> Drawn<()> {
         let (start, inner, labels) = (layout.start, layout.inner, Layout::LABELS);
         let at = [start[0] - labels[0], start[1]];
@@ -511,7 +511,7 @@ impl Panel {
             .x_label_area_size(FINE * labels[1])
             .y_label_area_size(FINE * labels[0])
             .build_cartesian_2d(x, y)?;
-        // Grid lines over a heat map would be read as its values.
+        // Grid lines over a heat map would be mistaken for values.
         let grid = match self.bar() {
             Some(_) => TRANSPARENT.into(),
             None => stroke(RGBColor(228, 228, 228), 1),
@@ -540,7 +540,7 @@ impl Panel {
             .try_for_each(|layer| layer.draw(area, &place))
     }
 
-    /// Ticks and name of the colour bar.
+    /// Draws ticks and name of the colour bar.
     fn draw_bar(&self, area: &Area<'_>, layout: &Layout) -> Drawn<()> {
         let Some((layer, range, _)) = self.bar() else {
             return Ok(());
@@ -576,13 +576,13 @@ impl Panel {
         Ok(())
     }
 
-    /// The entries of the legend in as many rows as their labels need.
+    /// The entries of the legend, in as many rows as their labels need.
     fn legend<'a>(&'a self, width: i32) -> Vec<Entry<'a>> {
         let (mut row, mut x) = (0, 0);
         let named = |layer: &&Layer| !layer.label.is_empty() && layer.bar().is_none();
         let entry = |layer: &'a Layer| {
             let Layer { label, .. } = layer;
-            // A letter is about half as wide as it is high.
+            // A letter is about half as wide as high.
             let length = 40 + 7 * label.chars().count() as i32;
             if x > 0 && x + length > width - 106 {
                 (row, x) = (row + 1, 0);
@@ -628,8 +628,8 @@ fn dashes(area: &Area<'_>, at: &[Pixel], colour: RGBColor) -> Drawn<()> {
 }
 
 impl Layer {
-    /// Draws everything but a heat map. `place` brings a position to the page, where it has a
-    /// finite place on the axes.
+    /// Draws all marks except a heat map. `place` maps a position to the page, if it is finite on
+    /// the axes.
     fn draw(&self, area: &Area<'_>, place: &dyn Fn(PlotPoint) -> Option<Pixel>) -> Drawn<()> {
         let colour = self.colour.rgb();
         let circles = |at: &[PlotPoint], radius: i32, style: ShapeStyle| -> Drawn<()> {

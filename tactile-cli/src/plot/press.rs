@@ -4,10 +4,10 @@ use crate::text::in_unit;
 use ndarray::Array2;
 use tactile_imaging::pipeline::{ContactSurface, Measurement, PipelineError, Press, with_error};
 
-/// Strains that differ by less are equal to rounding.
+/// Strains that differ by less are equal within rounding.
 const LEAST_SPREAD: f64 = 1e-9;
 
-/// Names and pages. In the lines of the summary a tab stands between name and value.
+/// The pages with their names. In the lines of the summary a tab separates name and value.
 pub(crate) fn press_pages(
     press: &mut Press<'_>,
     summary: Vec<String>,
@@ -88,7 +88,7 @@ fn axes(title: impl Into<String>) -> Panel {
     Panel::new(title, "x (mm)", "y (mm)")
 }
 
-/// From above, in millimetres.
+/// A point seen from above, in millimetres.
 fn above(p: &nalgebra::Point3<f64>) -> PlotPoint {
     [1e3 * p.x, 1e3 * p.y]
 }
@@ -159,7 +159,7 @@ fn surfaces_page(press: &mut Press<'_>) -> Result<Page, PlotError> {
     Ok(Page::new(heading, panels.len().min(columns), panels))
 }
 
-/// The guide's surface under a ball, by the law of its layers.
+/// The surface of the guide under a ball, from the law of its layers.
 fn depressions(press: &Press<'_>) -> Result<Option<Panel>, PlotError> {
     let mut panel = Panel::new(
         "The guide's surface, by the contact law",
@@ -171,7 +171,7 @@ fn depressions(press: &Press<'_>) -> Result<Option<Panel>, PlotError> {
         let Some(contact) = press.contact(frame)? else {
             continue;
         };
-        // To twice the contact radius, where most of the depression has faded.
+        // Up to twice the contact radius, where most of the depression has decayed.
         let step = contact.contact_radius_m.value / 20.0;
         let distances: Vec<f64> = (-40..=40).map(|k| f64::from(k) * step).collect();
         let Some(depths) = press.guide_depression_m(frame, &distances)? else {

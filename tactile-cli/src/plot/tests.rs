@@ -1,4 +1,4 @@
-//! What is drawn is in the file.
+//! Tests that drawn elements are in the file.
 use super::super::axis::label;
 use super::*;
 use ndarray::array;
@@ -93,7 +93,7 @@ fn axes_are_around_the_data_and_heat_maps_are_not_cut() {
     let around = |panel: Panel| panel.axes().map(|axis| axis.length());
     let line = panel().line([[0.0, 2.0], [10.0, 2.0]], Colour::Blue, "");
     let [x, y] = around(line);
-    // 4 % at both ends, and a tenth of a value where all are equal.
+    // The margin is 4 % at both ends, or a tenth of the value if all values are equal.
     assert!((x - 10.8).abs() < 1e-12 && (y - 0.4).abs() < 1e-12);
     let frame = HeatMap::of_frame(array![[10, 20], [30, 40]].view(), [5.0, 5.0]);
     assert_eq!(around(panel().heat_map(frame)), [10.0, 10.0]);

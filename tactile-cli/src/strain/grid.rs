@@ -1,11 +1,11 @@
-//! Displacement and strain at places of a grid or of the points, as files for other programs.
+//! Displacement and strain on a grid or at the points, as files for other programs.
 use super::quantities;
 use crate::failure::Failure;
 use crate::outputs::Npz;
 use nalgebra::{Matrix3, Point, SVector};
 use tactile_imaging::elasticity::kinematics::StrainQuantities;
 
-/// Points on equal distances over a box, x fastest.
+/// Equally spaced points in a box, with x running fastest.
 pub(super) struct StrainGrid<const D: usize> {
     origin: Point<f64, D>,
     spacing: f64,
@@ -21,7 +21,7 @@ impl<const D: usize> StrainGrid<D> {
             (low, high) = (low.inf(p), high.sup(p));
         }
         let count = |a: usize| ((high[a] - low[a]) / spacing).floor() + 1.0;
-        // The files have some 300 bytes for a point.
+        // The files need some 300 bytes per point.
         if (0..D).map(count).product::<f64>() > 4e6 {
             return Err(Failure::input(format!(
                 "--grid {spacing} gives more than four million points: give a larger spacing"
@@ -74,7 +74,7 @@ impl<const D: usize> StrainGrid<D> {
         for (name, tensors) in [("strain", strains), ("standard_error", errors)] {
             text.push_str(&format!("TENSORS {name} double\n"));
             for tensor in tensors {
-                // Symmetric: columns are rows.
+                // The tensors are symmetric, so that columns equal rows.
                 for column in tensor.column_iter() {
                     text.push_str(&three(&[column[0], column[1], column[2]]));
                     text.push('\n');
@@ -86,10 +86,10 @@ impl<const D: usize> StrainGrid<D> {
     }
 }
 
-/// Displacement, strain and its standard error at a place.
+/// Displacement, strain and its standard error at a point.
 pub(super) type Known<const D: usize> = (SVector<f64, D>, Matrix3<f64>, Matrix3<f64>);
 
-/// Completes arrays with places and what is known there, tensors of the plane or of space.
+/// Adds points, displacements, strains and errors to arrays, with tensors of the plane or of space.
 pub(super) fn arrays<const D: usize>(
     mut npz: Npz,
     shape: &[usize],

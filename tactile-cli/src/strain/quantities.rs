@@ -1,4 +1,4 @@
-//! What is read of a deformation beside its strain, as columns, arrays and fields of a grid.
+//! Quantities of a deformation besides its strain, as columns, arrays and fields of a grid.
 use crate::failure::Failure;
 use crate::outputs::Npz;
 use serde_json::{Map, Value, json};
@@ -8,13 +8,13 @@ use tactile_imaging::force::Estimate;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// A number of a place, its name and its standard error.
+/// Name, value and standard error of a quantity at a point.
 type Scalar = (String, f64, f64);
 
 /// A quantity and its standard error.
 type ValueAndError = fn(&StrainQuantities) -> [f64; 2];
 
-/// The name of the change of size.
+/// The name of the area or volume ratio.
 fn ratio<const D: usize>() -> &'static str {
     if D == 2 { "area_ratio" } else { "volume_ratio" }
 }
@@ -42,7 +42,7 @@ fn entries<const D: usize>() -> impl Iterator<Item = (usize, usize)> {
 }
 
 /// Headings of the columns: displacement gradient, scalars and principal directions, then their
-/// standard errors, of a direction that of its angle.
+/// standard errors. The error of a direction is that of its angle.
 pub(super) fn headings<const D: usize>() -> Vec<String> {
     let gradient = entries::<D>().map(|(i, j)| format!("du{}_d{}", AXES[i], AXES[j]));
     let scalars = scalars::<D>(&StrainQuantities::undefined()).into_iter();
@@ -66,7 +66,7 @@ pub(super) fn cells<const D: usize>(at: &StrainQuantities) -> Vec<f64> {
     row
 }
 
-/// Arrays of all places, `shape` of them.
+/// Arrays over all points, in this shape.
 pub(super) fn arrays<const D: usize>(
     npz: &mut Npz,
     shape: &[usize],
@@ -88,7 +88,7 @@ pub(super) fn arrays<const D: usize>(
     )?;
     let errors = tensor(|at, place| at.gradient_error[place]);
     npz.add("se_displacement_gradient", "<f8", &tensors, errors)?;
-    // Row k is direction k.
+    // Row k of the array is direction k.
     let directions = tensor(|at, (k, i)| at.directions[(i, k)]);
     npz.add("principal_direction", "<f8", &tensors, directions)?;
     let vector = |of: fn(&StrainQuantities) -> [f64; 3]| {
@@ -157,7 +157,7 @@ pub(super) fn vtk<const D: usize>(text: &mut String, found: &[StrainQuantities])
     }
 }
 
-/// The median of every scalar over the places and its median standard error.
+/// The median of every scalar over the points, and the median of its standard error.
 pub(super) fn json<const D: usize>(found: &[StrainQuantities]) -> Value {
     let places: Vec<Vec<Scalar>> = found.iter().map(scalars::<D>).collect();
     let middle = |mut values: Vec<f64>| {

@@ -1,4 +1,4 @@
-//! `tactile strain` of three frames and more: points are followed from frame to frame.
+//! `tactile strain` of three or more frames, whose points are followed from frame to frame.
 use super::{
     Frame, SERIES_FILES, StrainArguments, StrainReport, components_json, strain_cells,
     strain_headings,
@@ -10,8 +10,8 @@ use serde_json::{Value, json};
 use tactile_imaging::pipeline::with_error;
 use tactile_imaging::{SeriesStrain, StrainBetween, StrainSeries};
 
-/// Follows the points and returns the strain of the last frame that has one since the first. None
-/// after Ctrl-C.
+/// Follows the points and returns the strain between the first frame and the last frame with a
+/// strain. `None` after Ctrl-C.
 pub(super) fn follow<const D: usize>(
     frames: &[Frame<D>],
     unit: &'static str,
@@ -21,7 +21,7 @@ pub(super) fn follow<const D: usize>(
     let first = &frames[0];
     let mut series = StrainSeries::new(&first.points, arguments.options());
     let mut report = SeriesReport::<D>::new(first.number);
-    // Frames of the series are those that were not refused.
+    // The series contains the frames that were not refused.
     let mut followed = vec![first];
     let mut measured = StrainReport {
         before: first.points.clone(),
@@ -64,7 +64,7 @@ pub(super) fn follow<const D: usize>(
     Some(measured)
 }
 
-/// What is known of the frames.
+/// The results of a series, frame by frame.
 struct SeriesReport<const D: usize> {
     /// The number of the first frame with points.
     first: usize,

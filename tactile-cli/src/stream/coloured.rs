@@ -1,4 +1,4 @@
-//! `tactile stream` with a gel that is lit in colours: force, contact and depth live.
+//! `tactile stream` with a gel lit in colours: force, contact and depth live.
 use super::StreamArguments;
 use super::watch::{Meter, Watch, listed, watch};
 use crate::console::Context;
@@ -14,7 +14,7 @@ use tactile_imaging::gel::FrameDoubt;
 
 /// The results of one frame.
 pub(super) struct Row {
-    /// None without contact, or why it has none.
+    /// The force: `None` without contact, or the reason why there is none.
     force_n: Result<Option<Estimate>, String>,
     contact: Option<GelReading>,
     doubts: Vec<FrameDoubt>,
@@ -101,14 +101,14 @@ impl Meter for Gel {
     }
 }
 
-/// Measures frames of a gel that is lit in colours.
+/// Measures frames of a gel lit in colours.
 pub(super) fn coloured(
     sensor: &Path,
     arguments: &StreamArguments,
     context: &mut Context,
 ) -> Result<Exit, Failure> {
     if arguments.strain {
-        let sentence = "--strain is not there for a gel that is lit in colours";
+        let sentence = "--strain is not available for a gel lit in colours";
         return Err(Failure::input(sentence));
     }
     let frames = listed(&arguments.frames)?;

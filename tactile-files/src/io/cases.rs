@@ -1,7 +1,8 @@
 //! Case files of point matching, and the result files that answer them.
 //!
-//! [`read_cases`] says what a case is. A result is a line `case NAME time_ms`, then for every model row a line `w` (its warped position) and a line
-//! `a` (the target row assigned to it, −1 for none).
+//! [`read_cases`] describes a case. A result starts with a line `case NAME time_ms`. For every
+//! model row it has a line `w` (the warped position) and a line `a` (the assigned target row, −1
+//! for none).
 use super::error::{FileError, FilePlace, quoted};
 use super::files::read_bytes;
 use super::kinds::kind_of;
@@ -27,18 +28,18 @@ use std::path::Path;
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum CasePoints {
-    /// Two coordinates a point.
+    /// Two coordinates per point.
     Plane {
-        /// The points that move.
+        /// The model points, which are warped.
         model: Vec<Point2<f64>>,
-        /// The points to be met.
+        /// The target points, which stay.
         target: Vec<Point2<f64>>,
     },
-    /// Three coordinates a point.
+    /// Three coordinates per point.
     Space {
-        /// The points that move.
+        /// The model points, which are warped.
         model: Vec<Point3<f64>>,
-        /// The points to be met.
+        /// The target points, which stay.
         target: Vec<Point3<f64>>,
     },
 }
@@ -58,16 +59,16 @@ pub enum CasePoints {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct MatchCase {
-    /// Name, one word.
+    /// The name, which is one word.
     pub name: String,
-    /// What is to be matched.
+    /// The two point sets.
     pub points: CasePoints,
 }
 
 /// Reads all cases of a file.
 ///
 /// A case is a line `case NAME D n_model n_target`, then rows `m` (a model point) and `t` (a target
-/// point). Rows `g` and `p`, which hold the truth for a scorer, are passed over unread.
+/// point). Rows `g` and `p`, which hold the true answer for a scorer, are skipped.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -82,8 +83,8 @@ pub struct MatchCase {
 /// ```
 ///
 /// # Errors
-/// [`FileError`] with file and line, where a row is not of the format or the counts differ from the
-/// header's.
+/// [`FileError`] with file and line if a row has another format, or if the counts differ from the
+/// header.
 pub fn read_cases(path: impl AsRef<Path>) -> Result<Vec<MatchCase>, FileError> {
     let path = path.as_ref();
     let bytes = read_bytes(path)?;
@@ -139,13 +140,13 @@ pub fn read_cases(path: impl AsRef<Path>) -> Result<Vec<MatchCase>, FileError> {
     Ok(cases)
 }
 
-/// Writes the answer to one case.
+/// Writes the result of one case.
 ///
 /// # Errors
-/// Those of the writer.
+/// The errors of the writer.
 ///
 /// # Panics
-/// Where `warped` and `assignment` differ in length.
+/// If `warped` and `assignment` differ in length.
 pub fn write_case_result<const D: usize>(
     out: &mut impl Write,
     name: &str,
@@ -198,7 +199,7 @@ impl Row<'_> {
         for word in words {
             let value = word.parse().ok().filter(|v: &f64| v.is_finite());
             let value = value.ok_or_else(|| self.word(found + 2, "a finite number", word))?;
-            // Coordinates in excess are counted for the error, and not kept.
+            // Surplus coordinates are counted for the error message but not stored.
             if found < dimension {
                 point[found] = value;
             }

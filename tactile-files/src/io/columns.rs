@@ -1,6 +1,6 @@
-//! Headings of columns: their names, their units, and the names that programs give to coordinates.
+//! Column headings: names, units, and the names that other programs use for coordinates.
 
-/// Names of x, y and z, the usual one first: DICe, TrackMate, ParaView, scikit-image.
+/// Names of x, y and z, the usual one first (DICe, TrackMate, ParaView, scikit-image).
 pub(super) const AXES: [&str; 3] = [
     "x coordinate_x position_x points:0 centroid-1 cx xc col column",
     "y coordinate_y position_y points:1 centroid-0 cy yc row",
@@ -14,21 +14,21 @@ pub(super) const DISPLACEMENTS: [&[&str]; 3] = [
     &["w", "u_z", "uz", "dz", "displacement_z"],
 ];
 
-/// Names of a frame's number in tables of tracked points (TrackMate, trackpy).
+/// Names of the frame number in tables of tracked points (TrackMate, trackpy).
 pub(super) const FRAME: &[&str] = &["frame", "t"];
 
-/// Other names by which a comment is known as a heading.
+/// Other names that mark a comment as a heading.
 const USUAL: &str = "u v w depth force load darkness indentation position displacement time pressure \
                      id label pixel_value integrated_pixel_value frame t";
 
-/// A heading cut into its name, in lower case, and its unit.
+/// A heading, split into its name in lower case and its unit.
 pub(super) struct Heading {
     pub name: String,
     pub unit: Option<String>,
 }
 
 impl Heading {
-    /// Cuts `Force (mN)`, `x [µm]`, `depth mm` or `indentation_um` into name and unit.
+    /// Splits `Force (mN)`, `x [µm]`, `depth mm` or `indentation_um` into name and unit.
     pub(super) fn of(text: &str) -> Self {
         let bracketed = || {
             let inside = text.strip_suffix([')', ']'])?;
@@ -39,8 +39,8 @@ impl Heading {
             let mut parts = cuts.map(|(at, _)| (&text[..at], &text[at + 1..]));
             parts.find(|(name, unit)| !name.is_empty() && in_si(unit).is_some())
         };
-        // Whatever stands in brackets is meant as a unit, a word after a blank or a line only if it
-        // is one.
+        // Text in brackets is always a unit. A word after a blank, an underscore or a slash is one
+        // only if it is a known unit.
         let (name, unit) = match bracketed().or_else(suffixed) {
             Some((name, unit)) => (name, Some(unit.trim().to_owned())),
             None => (text, None),
@@ -50,7 +50,7 @@ impl Heading {
         Self { name, unit }
     }
 
-    /// Whether it is a usual name of a column, or has a known unit.
+    /// Whether the name is a usual one or the unit is known.
     pub(super) fn is_known(&self) -> bool {
         let mut names = AXES
             .into_iter()
@@ -69,7 +69,7 @@ impl Heading {
     }
 }
 
-/// The base unit and the value in SI of a unit. Both signs for micro are `u`.
+/// The base unit of a unit, and its value in SI units. Both signs for micro are `u`.
 pub(super) fn in_si(unit: &str) -> Option<(&'static str, f64)> {
     let unit = unit.replace(['µ', 'μ'], "u").replace("/frame", "");
     match unit.as_str() {
@@ -93,8 +93,9 @@ pub(super) fn in_si(unit: &str) -> Option<(&'static str, f64)> {
     })
 }
 
-/// The headings of x and y, and of z if it is there: by their usual names, or else the only ones that
-/// differ in the letter of their axis alone (`x coordinate`, `Pos. X`, `weighted_centroid_x`).
+/// The headings of x and y, and of z if there is one. They are found by their usual names.
+/// Otherwise they are the only headings that differ in nothing but the letter of the axis (`x
+/// coordinate`, `Pos. X`, `weighted_centroid_x`).
 pub(super) fn axes(headings: &[Heading]) -> Vec<&Heading> {
     let usual = |names: &&str| {
         let mut names = names.split_whitespace();
@@ -104,7 +105,7 @@ pub(super) fn axes(headings: &[Heading]) -> Vec<&Heading> {
     if found.len() > 1 {
         return found;
     }
-    // The words of a heading, with a mark in place of the axis. `None` for one without it.
+    // The words of a heading, with a mark in place of the axis. `None` if no word is the axis.
     let along = |heading: &Heading, axis: &str| {
         let words = heading.name.split(|c: char| !c.is_alphanumeric());
         let words: Vec<&str> = words

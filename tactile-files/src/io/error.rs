@@ -1,4 +1,4 @@
-//! The error of all files, read and written.
+//! The error type of all file access.
 use std::error::Error;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -63,7 +63,7 @@ impl fmt::Display for FilePlace {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileError {
-    /// The operating system does not read the file, or it is none that is meant to be read.
+    /// The operating system cannot read the file, or it is a folder, a pipe or a device.
     #[error("cannot read {}: {source}", path.display())]
     Read {
         /// The file.
@@ -71,7 +71,7 @@ pub enum FileError {
         /// The reason.
         source: std::io::Error,
     },
-    /// The operating system does not create or write the file.
+    /// The operating system cannot create or write the file.
     #[error("cannot write {}: {source}", path.display())]
     Write {
         /// The file.
@@ -79,34 +79,34 @@ pub enum FileError {
         /// The reason.
         source: std::io::Error,
     },
-    /// A place of the file holds something else than belongs there.
+    /// The content at a place of the file differs from what is expected there.
     #[error("{}{place}: expected {expected}, found {found}", path.display())]
     Content {
         /// The file.
         path: PathBuf,
         /// The place.
         place: FilePlace,
-        /// What belongs there.
+        /// The expected content.
         expected: String,
-        /// What is there, shortened if long.
+        /// The content found, shortened if long.
         found: String,
     },
-    /// A table without a row that has its numbers, or a stream without a frame.
+    /// A table without a complete row, or a stream without a frame.
     #[error("{}: expected at least one {of}, found none", path.display())]
     Empty {
         /// The file.
         path: PathBuf,
-        /// What it has none of.
+        /// The missing content.
         of: &'static str,
     },
-    /// A place of the file holds a value, or names a file, that cannot be used.
+    /// A value in the file, or a file that it names, cannot be used.
     #[error("{}{place}: {source}", path.display())]
     Rejected {
         /// The file.
         path: PathBuf,
         /// The place.
         place: FilePlace,
-        /// The reason, with what is expected there.
+        /// The reason, with the expected value.
         source: Box<dyn Error + Send + Sync>,
     },
     /// An image that cannot be decoded, encoded or turned into grey levels.
@@ -120,7 +120,7 @@ pub enum FileError {
 }
 
 impl FileError {
-    /// A place that holds something else than belongs there.
+    /// An error for unexpected content at a place.
     pub(crate) fn content(
         path: &Path,
         place: FilePlace,
@@ -135,7 +135,7 @@ impl FileError {
         }
     }
 
-    /// A table without rows.
+    /// An error for a table without rows.
     pub(super) fn no_rows(path: &Path) -> Self {
         Self::Empty {
             path: path.into(),
@@ -143,7 +143,7 @@ impl FileError {
         }
     }
 
-    /// A field of a TOML file whose value cannot be used.
+    /// An error for a field of a TOML file whose value cannot be used.
     pub(crate) fn field(
         path: &Path,
         field: impl Into<String>,
@@ -157,7 +157,7 @@ impl FileError {
     }
 }
 
-/// Text from a file as it can stand in a sentence: one line of at most `length` characters.
+/// Text from a file, shortened for an error message: one line of at most `length` characters.
 pub(super) fn quoted(text: &str, length: usize) -> String {
     let visible = |c: char| if c.is_control() { ' ' } else { c };
     let clean: String = text.trim().chars().map(visible).collect();

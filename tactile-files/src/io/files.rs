@@ -1,4 +1,4 @@
-//! Whole files in and out, and TOML files as structs with checked numbers.
+//! Reads and writes whole files, and reads TOML files into structs with checked numbers.
 use super::error::{FileError, FilePlace, quoted};
 use serde::de::{self, Deserialize, DeserializeOwned, Deserializer, Unexpected, Visitor};
 use std::fmt;
@@ -15,25 +15,24 @@ use {
     std::os::fd::AsRawFd,
 };
 
-/// Longest line of a video's header and longest header of an image, in bytes. Longer ones are no
-/// video, and a line without an end would fill the memory.
+/// Largest length of a line in a video header and of an image header, in bytes. No real file has
+/// longer ones, and a line without an end would fill the memory.
 pub(super) const LONGEST_HEADER: u64 = 4096;
 
-/// Largest file that is read, in bytes. No table, scene or frame needs more, and a device never
-/// ends.
+/// Size limit of a file that is read, in bytes. No table, scene or frame needs more.
 pub(super) const LARGEST_FILE: u64 = 512 << 20;
 
 /// Reads a whole file of at most 512 MiB.
 ///
 /// # Errors
-/// [`FileError::Read`], also for a folder, a pipe or a device.
+/// [`FileError::Read`], which includes folders, pipes and devices.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>, FileError> {
     let read = || {
         let file = open_file(path)?;
         let length = file.metadata()?.len();
         let mut bytes = Vec::new();
         if length <= LARGEST_FILE {
-            // The size may grow while the file is read, or be unknown to the system (in /proc).
+            // The file may grow while it is read, and files in /proc have no stated size.
             file.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
         }
         // One byte beyond the limit is enough to refuse a file.
@@ -50,7 +49,7 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>, FileError> {
     })
 }
 
-/// Opens a file, but no folder, pipe or device.
+/// Opens a regular file. Folders, pipes and devices are refused.
 pub(super) fn open_file(path: &Path) -> std::io::Result<fs::File> {
     let metadata = fs::metadata(path)?;
     // Opening a pipe without a writer would wait for ever, and a device may never end.
@@ -76,16 +75,16 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     })
 }
 
-/// Writes a whole file, creating its folder where needed.
+/// Writes a whole file and creates its folder if it is missing.
 ///
-/// A reader finds the old file or the new one. A full disk, a limit of the file's size and the end
-/// of the process, whatever ends it, leave the old one and nothing beside it, but for the instant in
-/// which the whole new one has a name of its own (`.part`). Permissions of a file that is replaced
-/// are kept, and a link is followed. A device (`/dev/stdout`) is written to as it
-/// is.
+/// A reader finds either the old file or the complete new one. If the disk is full, the file
+/// exceeds a size limit or the process ends, the old file stays and no partial file is left. The
+/// exception is the instant before the replacement, when the complete new file has a temporary name
+/// (`.part`). The permissions of a replaced file are kept, and a link is followed. A device
+/// (`/dev/stdout`) is written to directly.
 ///
 /// # Errors
-/// Those of the operating system, and a pipe, which may have no reader.
+/// The errors of the operating system. A pipe is refused, because it may have no reader.
 pub fn replace_file(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let refused = |kind, reason: &str| Err(Error::new(kind, reason));
     let (target, permissions) = match fs::metadata(path) {
@@ -115,8 +114,8 @@ pub fn replace_file(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     }
 }
 
-/// A file with this content under a name of its own, which goes away with the value. `None` where
-/// it has that of the target already, which was free.
+/// A temporary file with this content, which is removed when the value is dropped. `None` if the
+/// target did not exist, so that the file could take its name at once.
 fn temporary(
     folder: &Path,
     #[cfg_attr(not(target_os = "linux"), allow(unused))] target: &Path,
@@ -129,7 +128,7 @@ fn temporary(
     };
     let mut name = tempfile::Builder::new();
     name.prefix(".").suffix(".part");
-    // A file without a name until it is whole: what ends the process meanwhile leaves nothing.
+    // The file has no name until it is complete, so that a process that ends early leaves nothing.
     #[cfg(target_os = "linux")]
     if let Ok(file) = rustix::fs::open(
         folder,
@@ -140,11 +139,11 @@ fn temporary(
         fill(&file)?;
         let own = format!("/proc/self/fd/{}", file.as_raw_fd());
         let link = |path: &Path| rustix::fs::linkat(CWD, &own, CWD, path, AtFlags::SYMLINK_FOLLOW);
-        // A free name is taken at once.
+        // If no file has the target's name, it is taken at once.
         if link(target).is_ok() {
             return Ok(None);
         }
-        // A name for the moment until it takes the place of another.
+        // A temporary name, until the file replaces the old one.
         let linked = name.make_in(folder, |path| Ok(link(path)?));
         return Ok(Some(linked?.into_temp_path()));
     }
@@ -175,8 +174,8 @@ pub(crate) fn parse_toml<T: DeserializeOwned>(text: &str, path: &Path) -> Result
     let rejected = |place: FilePlace, error: &toml::de::Error| FileError::Rejected {
         path: path.into(),
         place,
-        // A sentence is one line, whatever the file holds. The longest list of names fits. The
-        // parser has words of its own for a name that is no text.
+        // The message is one line for any content of the file, and 400 characters hold the longest
+        // list of names. The parser words the error of a name that is not a string differently.
         source: quoted(error.message(), 400)
             .replace("wanted string or table", "invalid type, expected a string")
             .into(),
@@ -200,7 +199,8 @@ pub(crate) fn parse_toml<T: DeserializeOwned>(text: &str, path: &Path) -> Result
 
 /// The path of the field whose key or value stands at these bytes of a TOML text.
 fn field_at(bytes: &Range<usize>, text: &str) -> Option<String> {
-    // An array of tables has the place of its first table's header: the inner one is named.
+    // The parser places an array of tables at the header of its first table. The inner table is
+    // named.
     fn within(bytes: &Range<usize>, path: String, value: &Spanned<DeValue<'_>>) -> Option<String> {
         let inner = match value.get_ref() {
             DeValue::Table(table) => in_table(bytes, &format!("{path}."), table),
@@ -223,12 +223,12 @@ fn field_at(bytes: &Range<usize>, text: &str) -> Option<String> {
     in_table(bytes, "", DeTable::parse(text).ok()?.get_ref())
 }
 
-/// The path that a file names, relative to the folder of that file.
+/// Resolves a path in a file relative to the folder of that file.
 pub(crate) fn beside(file: &Path, name: &Path) -> PathBuf {
     file.parent().unwrap_or(Path::new("")).join(name)
 }
 
-/// What a field accepts: the words of a sentence, and the test.
+/// The condition of a field, in words and as a test.
 struct Number {
     expected: &'static str,
     accepts: fn(f64) -> bool,
@@ -297,7 +297,7 @@ pub(crate) fn positive_pair<'de, D: Deserializer<'de>, T: From<[f64; 2]>>(
     Ok(pair.map(|number| number.0).into())
 }
 
-/// An array of one or more.
+/// An array with at least one element.
 pub(crate) fn one_or_more<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
     deserializer: D,
 ) -> Result<Vec<T>, D::Error> {

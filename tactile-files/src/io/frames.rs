@@ -1,5 +1,4 @@
-//! Frames one after the other, from a video, concatenated images, a stack of pages, arrays or one
-//! image.
+//! Reads frames in order from a video, concatenated images, a stack of pages, arrays or one image.
 mod anymap;
 mod avi;
 mod jpeg;
@@ -20,41 +19,42 @@ use tactile_imaging::pipeline::FrameSource;
 
 pub(crate) use self::npy::{header_fields, members};
 
-/// First bytes of an array of NumPy, and of an archive of them.
+/// First bytes of a NumPy array, and of an archive of arrays.
 pub(super) const ARRAY_STARTS: [&[u8]; 2] = npy::START;
 
-/// What reads videos of other codecs.
+/// The remedy for videos of other codecs.
 const PIPE: &str = "pipe it by ffmpeg -i VIDEO -f yuv4mpegpipe -pix_fmt gray - | tactile … -";
 
-/// Most damaged frames that are named.
+/// Largest number of damaged frames that are named.
 const MOST_NAMED: usize = 10;
 
 /// The frames of a stream of bytes: a pipe from a camera, a video, a file.
 ///
 /// The first bytes show the format.
 ///
-/// - **YUV4MPEG2**, as `ffmpeg -f yuv4mpegpipe` writes it. The luma plane is the grey, as it is
-///   stored. Samples have 8 to 16 bits.
-/// - **PGM and PPM**, of binary samples, any number one after the other.
-/// - **JPEG and PNG**, any number one after the other, as `ffmpeg -f image2pipe` writes them. JPEG
-///   frames without Huffman tables have the standard ones.
-/// - **AVI** of JPEG frames (MJPG), as webcams record them, or of uncompressed ones (I420, YUY2,
-///   Y800 and their kin, of which the luma is taken, and 24-bit colours). Frames that the recorder
-///   dropped keep their time.
+/// - **YUV4MPEG2**, as `ffmpeg -f yuv4mpegpipe` writes it. The stored luma plane is the grey image.
+///   Samples have 8 to 16 bits.
+/// - **PGM and PPM** with binary samples, any number of images in a row.
+/// - **JPEG and PNG**, any number in a row, as `ffmpeg -f image2pipe` writes them. JPEG frames
+///   without Huffman tables are decoded with the standard ones.
+/// - **AVI** of JPEG frames (MJPG), as webcams record them, or of uncompressed frames. Of I420,
+///   YUY2, Y800 and related formats the luma is taken; 24-bit colours are read too. Dropped frames
+///   count for the times of later frames.
 /// - **NPY and NPZ** of NumPy: arrays of `uint8` or `uint16` in C order, of shape (rows, columns)
-///   or (frames, rows, columns), with 3 behind them for colours. Several arrays follow each other
-///   in an archive, and in a pipe that `numpy.save` writes to. An archive's arrays of other numbers
-///   are passed over.
-/// - **TIFF**, a frame a page.
-/// - Any other image of [`read_grey_image`](super::read_grey_image): one frame.
+///   or (frames, rows, columns), with 3 behind them for colours. An archive, or a pipe that
+///   `numpy.save` writes to, may hold several arrays. Arrays of other number types in an archive
+///   are skipped.
+/// - **TIFF**, one frame per page.
+/// - Any other image that [`read_grey_image`](super::read_grey_image) reads, as one frame.
 ///
-/// A frame of an AVI, or of JPEG and PNG images, that cannot be decoded or has another size than the
-/// first is passed over, and [`passed_over`](Self::passed_over) names it.
+/// A frame of an AVI file, or of JPEG and PNG images, is skipped if it cannot be decoded or differs
+/// in size from the first. [`passed_over`](Self::passed_over) names the skipped frames.
 ///
-/// As a [`FrameSource`] it gives grey frames. [`next_colour_frame`](Self::next_colour_frame) gives
-/// those of a gel that is lit in colours.
+/// The [`FrameSource`] implementation returns grey frames.
+/// [`next_colour_frame`](Self::next_colour_frame) returns frames in colour, for gels lit in
+/// colours.
 ///
-/// Memory is that of one frame, but for TIFF and other images, which are read whole.
+/// One frame is held in memory at a time. TIFF files and other single images are read whole.
 ///
 /// ```
 /// use ndarray::{Array2, array};
@@ -75,19 +75,19 @@ const MOST_NAMED: usize = 10;
 /// ```
 pub struct FrameReader {
     input: Box<dyn BufRead + Send>,
-    /// None at the end.
+    /// `None` at the end of the stream.
     decoder: Option<Box<dyn Decoder>>,
     name: PathBuf,
     grey: Grey,
     bits: Option<u8>,
-    /// The number of frames that were read, those that were dropped or damaged included.
+    /// The number of frames so far, including dropped and damaged ones.
     frames: u64,
     damaged: u64,
     dropped: u64,
     passed_over: Vec<String>,
-    /// That of the first damaged frame.
+    /// The error of the first damaged frame.
     first_error: Option<FileError>,
-    /// Rows and columns of the first frame, which the others have too.
+    /// Rows and columns of the first frame, which all frames must have.
     size: Option<(usize, usize)>,
     colour: Option<[f64; 3]>,
     default_rate_hz: f64,
@@ -101,10 +101,10 @@ impl std::fmt::Debug for FrameReader {
     }
 }
 
-/// How the frames of one format are found in a stream. A format is a file with its decoder, an entry
+/// Finds the frames of one format in a stream. A new format needs a file with its decoder, an entry
 /// in [`FORMATS`] and a row in `docs/cameras.md`.
 trait Decoder: Send {
-    /// The next frame as it is stored. The memory of an older one may be used.
+    /// The next frame as it is stored. `memory` may be reused for it.
     fn next(&mut self, input: &mut dyn BufRead, memory: Vec<u8>)
     -> Result<Option<Encoded>, Broken>;
 
@@ -113,12 +113,12 @@ trait Decoder: Send {
         None
     }
 
-    /// Frames so far that the recorder dropped.
+    /// Number of frames so far that the recorder dropped.
     fn dropped(&self) -> u64 {
         0
     }
 
-    /// Whether the frames after one that cannot be decoded are found.
+    /// Whether the stream can be read on after a frame that cannot be decoded.
     fn goes_on(&self) -> bool {
         false
     }
@@ -128,12 +128,12 @@ type Opened = Result<Box<dyn Decoder>, Broken>;
 
 struct Format {
     name: &'static str,
-    /// Whether a stream with these first bytes is of the format.
+    /// Whether a stream with these first bytes has the format.
     begins: fn(&[u8]) -> bool,
     open: fn(&mut dyn BufRead) -> Opened,
 }
 
-/// All formats. The first that a stream begins as is taken.
+/// All formats. The first one whose test of the first bytes succeeds is used.
 const FORMATS: [Format; 8] = [
     y4m::FORMAT,
     anymap::FORMAT,
@@ -157,17 +157,17 @@ pub fn frame_formats() -> String {
 }
 
 impl FrameReader {
-    /// Opens a file, or standard input where the path is `-`. A stream that does not state its
-    /// frame rate has `frame_rate_hz`.
+    /// Opens a file, or standard input if the path is `-`. `frame_rate_hz` is used if the stream
+    /// does not state its frame rate.
     ///
     /// # Errors
-    /// [`FileError`] where the file cannot be read or its header is no stream's.
+    /// [`FileError`] if the file cannot be read or its header is not that of a known stream.
     pub fn open(path: impl AsRef<Path>, frame_rate_hz: f64) -> Result<Self, FileError> {
         let path = path.as_ref();
         if path == Path::new("-") {
-            // A pipe holds 64 kB by default, a twentieth of a large frame. Each filling wakes both
-            // programs: with 1 MiB three times as many frames come through (1392 × 1042 pixels).
-            // What is no pipe, or may not grow, is read as it is.
+            // A pipe holds 64 kB by default, a twentieth of a large frame, and each filling wakes
+            // both programs. With 1 MiB three times as many frames of 1392 × 1042 pixels pass. If
+            // the input is no pipe or may not grow, the call has no effect.
             #[cfg(target_os = "linux")]
             let _ = rustix::pipe::fcntl_setpipe_size(stdin(), 1 << 20);
             return Self::new(stdin(), "standard input", frame_rate_hz);
@@ -179,10 +179,10 @@ impl FrameReader {
         Self::new(file, path, frame_rate_hz)
     }
 
-    /// Reads frames from any reader. Errors call it by `name`.
+    /// Reads frames from any reader. Error messages use `name` for it.
     ///
     /// # Errors
-    /// [`FileError`] where the reader fails or its first bytes are no stream's.
+    /// [`FileError`] if the reader fails or its first bytes are not those of a known stream.
     pub fn new(
         input: impl Read + Send + 'static,
         name: impl Into<PathBuf>,
@@ -222,14 +222,14 @@ impl FrameReader {
         })
     }
 
-    /// How colours become grey, in formats that store colours as red, green and blue.
+    /// Sets the conversion from colour to grey, for formats that store red, green and blue.
     #[must_use]
     pub fn with_grey(mut self, grey: Grey) -> Self {
         self.grey = grey;
         self
     }
 
-    /// The bits of the camera, as [`read_grey_image`](super::read_grey_image) takes them.
+    /// Sets the bits of the camera, see [`read_grey_image`](super::read_grey_image).
     #[must_use]
     pub fn with_bits(mut self, bits: Option<u8>) -> Self {
         self.bits = bits;
@@ -241,21 +241,21 @@ impl FrameReader {
         self.decoder.as_ref()?.rate_hz()
     }
 
-    /// Mean red, green and blue of the last frame that was read as a grey one. `None` for one that is
-    /// stored as grey.
+    /// Mean red, green and blue of the last frame that was read as grey. `None` if it is stored as
+    /// grey.
     #[must_use]
     pub fn colour(&self) -> Option<[f64; 3]> {
         self.colour
     }
 
-    /// Number of frames so far, those that were dropped or damaged included.
+    /// Number of frames so far, including dropped and damaged ones.
     #[must_use]
     pub fn frames(&self) -> u64 {
         self.frames
     }
 
-    /// The frames that were passed over so far: the number that the recorder dropped, that of damaged
-    /// ones, and a sentence on each of the first of these.
+    /// The frames that were skipped so far: the number of dropped frames, the number of damaged
+    /// frames, and one sentence about each of the first ten damaged frames.
     ///
     /// ```
     /// use tactile_files::io::FrameReader;
@@ -287,8 +287,8 @@ impl FrameReader {
     /// ```
     ///
     /// # Errors
-    /// As the grey frames, and [`FileError::Content`] for grey ones. A YUV4MPEG2 video counts as
-    /// grey: most halve the resolution of colours.
+    /// The errors of grey frames, and [`FileError::Content`] if the frames are grey. A YUV4MPEG2
+    /// video counts as grey, because most such videos halve the resolution of the colours.
     pub fn next_colour_frame(&mut self, frame: &mut Array3<u8>) -> Result<Option<f64>, FileError> {
         let colours = |found: &str| Broken::new("a frame in red, green and blue", found);
         let convert = |encoded: Encoded, name: &Path| {
@@ -311,7 +311,8 @@ impl FrameReader {
         }))
     }
 
-    /// The next frame and its time. `convert` makes it, and `size` gives its rows and columns.
+    /// The next frame and its time. `convert` makes the frame, and `size` returns its rows and
+    /// columns.
     fn next_of<T>(
         &mut self,
         memory: Vec<u8>,
@@ -356,7 +357,7 @@ impl FrameReader {
                         of: "frame",
                     };
                     return match ended {
-                        // A stream of damaged frames alone has no frame.
+                        // A stream in which all frames are damaged is an error.
                         Ok(_) if self.size.is_none() => {
                             Err(self.first_error.take().unwrap_or_else(empty))
                         }
@@ -367,7 +368,7 @@ impl FrameReader {
         }
     }
 
-    /// A frame of the size of the first.
+    /// Checks that a frame has the size of the first.
     fn sized<T>(&mut self, frame: T, size: impl Fn(&T) -> (usize, usize)) -> Result<T, Broken> {
         let found = size(&frame);
         let first = *self.size.get_or_insert(found);
@@ -378,12 +379,12 @@ impl FrameReader {
     }
 }
 
-/// A frame as its stream stores it.
+/// A frame as stored in the stream.
 enum Encoded {
     /// A file whose first image is the frame.
     File(Arc<Vec<u8>>),
     Decoded(DynamicImage),
-    /// Grey levels of so many rows and columns.
+    /// Grey levels with their numbers of rows and columns.
     Luma {
         size: (usize, usize),
         samples: Vec<u8>,
@@ -396,8 +397,8 @@ impl FrameSource for FrameReader {
     /// Writes the next frame into `frame` and returns its time in seconds, counted from the first.
     ///
     /// # Errors
-    /// [`FileError::Content`] where a frame is cut short, is none, or has another size than the
-    /// first, and [`FileError::Image`] where it cannot be decoded. The stream has then ended.
+    /// [`FileError::Content`] if a frame is cut short, is no frame or differs in size from the
+    /// first; [`FileError::Image`] if it cannot be decoded. The stream has then ended.
     fn next_frame(&mut self, frame: &mut Array2<u8>) -> Result<Option<f64>, Self::Error> {
         let memory = take(frame).into_raw_vec_and_offset().0;
         let (grey, bits) = (self.grey, self.bits);
@@ -421,14 +422,14 @@ impl FrameSource for FrameReader {
     }
 }
 
-/// Why a stream does not go on.
+/// The reason why a stream ends.
 enum Broken {
     Read(Error),
     Content {
         expected: String,
         found: String,
     },
-    /// Rows and columns that are not those of the first frame.
+    /// The size differs from that of the first frame.
     OtherSize {
         first: (usize, usize),
         found: (usize, usize),
@@ -481,8 +482,8 @@ impl From<FileError> for Broken {
     }
 }
 
-/// Appends the next bytes, fewer at the end of the stream. Memory grows with what arrives, not with
-/// what a header announces.
+/// Appends the next bytes, or fewer at the end of the stream. Memory grows with the bytes that
+/// arrive, not with the size that a header announces.
 fn append(input: &mut dyn Read, length: usize, bytes: &mut Vec<u8>) -> IoResult<usize> {
     input.take(length as u64).read_to_end(bytes)
 }

@@ -7,17 +7,17 @@ use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
 use std::io::Cursor;
 use std::path::Path;
 
-/// Grey levels by which red, green and blue of a pixel differ if it is in colour: more than a codec
-/// rounds. A sensor without contact is nearly black, so that its colours differ by few.
+/// Smallest difference between red, green and blue of a coloured pixel, in grey levels. It exceeds
+/// the rounding of codecs, and is small because a sensor without contact is nearly black.
 const LEAST_TINT: f64 = 1.0;
 
-/// Share of such pixels in an image that is in colour. A stamp of the time has fewer.
+/// Smallest share of coloured pixels in a colour image. A time stamp in the picture has fewer.
 const TINTED_SHARE: f64 = 1e-3;
 
-/// How red, green and blue make a grey level, on the stored (gamma-coded) values.
+/// The weights that turn the stored (gamma-coded) red, green and blue into a grey level.
 ///
-/// A calibration holds for the grey that it was made with. Reading colour frames by another one
-/// moves every level.
+/// A calibration is valid only for the conversion that it was made with. Another conversion changes
+/// every grey level of a colour frame.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -42,7 +42,7 @@ pub enum Grey {
 }
 
 impl Grey {
-    /// Weights of red, green and blue, of sum 1.
+    /// Weights of red, green and blue, which add up to 1.
     pub fn weights(self) -> [f64; 3] {
         match self {
             Grey::Rec601 => [0.299, 0.587, 0.114],
@@ -72,8 +72,7 @@ pub struct GreyImage {
     pub levels: Array2<f64>,
     /// Bits of a sample in the file: 8 or 16.
     pub bits: u8,
-    /// Mean red, green and blue. `None` for a grey image, also for one that is stored in three
-    /// channels.
+    /// Mean red, green and blue. `None` for a grey image, even if it is stored in three channels.
     pub colour: Option<[f64; 3]>,
 }
 
@@ -85,18 +84,18 @@ impl GreyImage {
     }
 }
 
-/// Reads a grey image, of the format that its content shows, whatever its name.
+/// Reads a grey image. The format is detected from the content, not from the name.
 ///
 /// Colour is turned to grey by the weights of `grey`, on the stored (gamma-coded) values. Alpha is
 /// ignored. Levels are on the scale of 8 bits, and samples of more bits keep their precision as
-/// fractions: a sample v becomes 255 v/m, where m is the largest value that the camera gives.
+/// fractions. A sample v becomes 255 v/m, where m is the largest value of the camera.
 ///
 /// - Images of 8 bits are not scaled.
 /// - A PGM or PPM states m, its `maxval`.
-/// - A PNG or TIFF of 16 bits does not. There m is 65535, or 2ᵇ − 1 where the caller gives the
-///   `bits` b, 1 to 16. A camera of 12 bits often writes its samples into 16 as they are. An image
-///   without any sample above 4095 is therefore refused until the bits are given. It is taken where
-///   all samples are multiples of 257, as 8 bits stretched to 16 are.
+/// - A PNG or TIFF of 16 bits does not state m. It is 65535, or 2ᵇ − 1 if the caller passes the
+///   `bits` b from 1 to 16. Cameras of 12 bits often store their samples unscaled in 16 bits. An
+///   image without a sample above 4095 is therefore refused if `bits` is `None`. An exception are
+///   images whose samples are all multiples of 257, which are 8 bits scaled to 16.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -118,8 +117,8 @@ impl GreyImage {
 /// ```
 ///
 /// # Errors
-/// [`FileError`] where the file cannot be read or decoded, is too large, its depth is not clear, or
-/// a sample needs more bits than given.
+/// [`FileError`] if the file cannot be read or decoded, is too large or has an unclear depth, or if
+/// a sample needs more than `bits` bits.
 pub fn read_grey_image(
     path: impl AsRef<Path>,
     grey: Grey,
@@ -131,8 +130,7 @@ pub fn read_grey_image(
     to_grey(image, &bytes, path, grey, bits)
 }
 
-/// Rows and columns of an image, from its header alone. `None` for what is no image that can be
-/// read.
+/// Rows and columns of an image, read from its header. `None` if the file is not a readable image.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -157,20 +155,21 @@ fn header(path: &Path) -> Option<impl ImageDecoder + use<>> {
     reader.into_decoder().ok()
 }
 
-/// Reads a grey image in eight bits a pixel, as [`GreyImage::to_u8`] gives it.
+/// Reads a grey image and rounds it to eight bits per pixel, as [`GreyImage::to_u8`] does.
 ///
 /// # Errors
-/// As [`read_grey_image`].
+/// The errors of [`read_grey_image`].
 pub fn read_grey_levels(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, FileError> {
     let bytes = read_bytes(path)?;
     let image = eight_bit_levels(decode(&bytes, path)?, &bytes, path, Grey::default(), bits)?;
     Ok(image.0)
 }
 
-/// Mean red, green and blue of an image file, as [`GreyImage::colour`]. A grey one is not decoded.
+/// Mean red, green and blue of an image file, see [`GreyImage::colour`]. A grey image is not
+/// decoded.
 ///
 /// # Errors
-/// As [`read_grey_image`].
+/// The errors of [`read_grey_image`].
 pub fn image_colour(path: &Path) -> Result<Option<[f64; 3]>, FileError> {
     match header(path) {
         Some(header) if !header.color_type().has_color() => Ok(None),
@@ -178,8 +177,8 @@ pub fn image_colour(path: &Path) -> Result<Option<[f64; 3]>, FileError> {
     }
 }
 
-/// The levels of an image, whose encoded `bytes` may state the largest sample, in eight bits a
-/// pixel, and its colour.
+/// The colour of an image and its levels in eight bits per pixel. The encoded `bytes` may state the
+/// largest sample.
 pub(super) fn eight_bit_levels(
     image: DynamicImage,
     bytes: &[u8],
@@ -188,7 +187,7 @@ pub(super) fn eight_bit_levels(
     bits: Option<u8>,
 ) -> Result<(Array2<u8>, Option<[f64; 3]>), FileError> {
     match image {
-        // Samples that are grey levels already are taken as they stand.
+        // Grey samples of eight bits are used unchanged.
         DynamicImage::ImageLuma8(image) => {
             let shape = (image.height() as usize, image.width() as usize);
             let levels = Array2::from_shape_vec(shape, image.into_raw());
@@ -201,7 +200,7 @@ pub(super) fn eight_bit_levels(
     }
 }
 
-/// Reads a colour image in eight bits a channel, `[row, column, channel]`.
+/// Reads a colour image with eight bits per channel, `[row, column, channel]`.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -217,7 +216,7 @@ pub(super) fn eight_bit_levels(
 /// ```
 ///
 /// # Errors
-/// [`FileError`] where the file cannot be read or decoded, is too large or grey.
+/// [`FileError`] if the file cannot be read or decoded, is too large or is grey.
 pub fn read_colour_levels(path: impl AsRef<Path>) -> Result<Array3<u8>, FileError> {
     let path = path.as_ref();
     let image = decode(&read_bytes(path)?, path)?;
@@ -226,8 +225,8 @@ pub fn read_colour_levels(path: impl AsRef<Path>) -> Result<Array3<u8>, FileErro
 
 /// Red, green and blue in eight bits. `None` for a grey image.
 ///
-/// Samples of 16 bits that do not exceed 10 or 12 bits are those of such a camera: they are divided
-/// by its range, not by that of 16 bits.
+/// Samples of 16 bits that do not exceed 10 or 12 bits come from a camera of that depth. They are
+/// divided by its range, not by that of 16 bits.
 pub(super) fn colour_levels(image: DynamicImage) -> Option<Array3<u8>> {
     if !image.color().has_color() || is_grey_in_three(&image) {
         return None;
@@ -248,7 +247,8 @@ pub(super) fn colour_levels(image: DynamicImage) -> Option<Array3<u8>> {
     Array3::from_shape_vec(shape, image.into_raw()).ok()
 }
 
-/// Whether a grey image was saved in three equal channels. One of a single colour shows nothing.
+/// Whether a grey image was saved in three equal channels. An image of a single colour does not
+/// count.
 fn is_grey_in_three(image: &DynamicImage) -> bool {
     let DynamicImage::ImageRgb8(image) = image else {
         return false;
@@ -258,8 +258,8 @@ fn is_grey_in_three(image: &DynamicImage) -> bool {
     is_grey && pixels.iter().any(|pixel| *pixel != pixels[0])
 }
 
-/// Reads the image that a field of `file` names. It has to have the size of the reference, where
-/// that is known.
+/// Reads the image that a field of `file` names. Its size must be that of the reference, if there
+/// is one.
 pub(crate) fn read_frame(
     file: &Path,
     field: &str,
@@ -282,7 +282,7 @@ pub(crate) fn read_frame(
     Err(FileError::field(file, field, reason))
 }
 
-/// Longest side and most pixels that are read. A header of some bytes can announce any size.
+/// Limits of the side and the number of pixels. A damaged header can announce any size.
 pub(super) fn largest_image() -> (u32, u64) {
     (30_000, 64_000_000)
 }
@@ -296,7 +296,7 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileErro
     if is_cut_jpeg(bytes) {
         return Err(refused(path, DAMAGED));
     }
-    // Before its samples an animated PNG announces its frames.
+    // An animated PNG announces its frames before the samples.
     let start = &bytes[..bytes.len().min(LONGEST_HEADER as usize)];
     if start.starts_with(b"\x89PNG") && start.windows(4).any(|chunk| chunk == b"acTL") {
         return Err(refused(path, "it is an animation: save its frames as PNG"));
@@ -305,9 +305,9 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileErro
     let mut limits = Limits::default();
     limits.max_image_width = Some(side);
     limits.max_image_height = Some(side);
-    // Four samples of 16 bits a pixel, the widest that is decoded.
+    // The widest pixel that is decoded has four samples of 16 bits.
     limits.max_alloc = Some(8 * pixels);
-    // An error of the decoder and a sentence of this reader end in one place.
+    // Errors of the decoder and of this reader are wrapped in one place.
     let decoded = || {
         let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
         reader.limits(limits.clone());
@@ -325,7 +325,7 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileErro
         }
         let orientation = decoder.orientation()?;
         let mut image = DynamicImage::from_decoder(decoder)?;
-        // A camera that was turned notes it beside the pixels.
+        // A rotated camera notes its orientation beside the pixels.
         image.apply_orientation(orientation);
         if image.color().bytes_per_pixel() / image.color().channel_count() > 2 {
             return Ok(Err(OTHER_SAMPLES.to_owned()));
@@ -338,18 +338,18 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileErro
 
 const DAMAGED: &str = "the image is damaged or cut short";
 
-/// Whether the samples of a JPEG image have no end: a decoder makes up the rest.
+/// Whether the samples of a JPEG image lack their end marker. The decoder would invent the rest.
 fn is_cut_jpeg(bytes: &[u8]) -> bool {
     let last = |marker: u8| bytes.windows(2).rposition(|pair| pair == [0xff, marker]);
     let (end, samples) = (0xd9, 0xda);
     bytes.starts_with(b"\xff\xd8\xff") && last(end) < last(samples)
 }
 
-/// What is not decoded, or not to levels.
+/// The message for images that cannot be decoded to levels.
 const OTHER_SAMPLES: &str = "it is stored in a way that is not read: save it with whole numbers of 8 or 16 \
      bits without sign, packed by LZW, Deflate or not at all";
 
-/// A codec's error in words of this reader.
+/// The message of this reader for an error of the codec.
 fn in_words(error: &ImageError) -> String {
     match error {
         ImageError::Unsupported(_) => OTHER_SAMPLES.into(),
@@ -376,7 +376,7 @@ fn to_grey(
         image.color(),
         (image.height() as usize, image.width() as usize),
     );
-    // 8 bits become 16 by a factor of 257, which the division below takes back exactly.
+    // The decoder scales 8 bits to 16 by the factor 257, which the division below inverts exactly.
     let samples = match colour.has_color() {
         true => image.into_rgb16().into_raw(),
         false => image.into_luma16().into_raw(),
@@ -388,7 +388,7 @@ fn to_grey(
         Ok(65_535.0)
     };
     let scale = white.map_err(|reason| refused(path, reason))? / 255.0;
-    // Where the caller gives the bits, the decoder's rounding can pass the largest level.
+    // If the caller passes the bits, the decoder's rounding can exceed the largest level.
     let level = |sample: u16| f64::from(sample) / scale;
     let (mut sums, mut tinted) = ([0; 3], 0);
     let levels: Vec<f64> = if colour.has_color() {
@@ -417,15 +417,15 @@ fn to_grey(
     })
 }
 
-/// The sample of 16 bits that stands for the level 255. The decoder stretches the samples of a PGM,
-/// PPM or PAM from the largest value that the header announces to the full range.
+/// The 16-bit sample that corresponds to level 255. The decoder scales the samples of a PGM, PPM or
+/// PAM from the maximum in the header to the full range.
 fn white_of(samples: &[u16], bytes: &[u8], bits: Option<u8>) -> Result<f64, String> {
     let brightest = samples.iter().copied().max().unwrap_or(u16::MAX);
     let announced = announced_maximum(bytes);
     if let Some(bits) = bits {
         let stretch = announced.map_or(1.0, |maximum| f64::from(u16::MAX) / f64::from(maximum));
         let white = stretch * f64::from((1_u32 << bits.clamp(1, 16)) - 1);
-        // Half a sample for the decoder's rounding.
+        // Half a sample allows for the decoder's rounding.
         if f64::from(brightest) <= white + 0.5 {
             return Ok(white);
         }
@@ -446,7 +446,7 @@ fn white_of(samples: &[u16], bytes: &[u8], bits: Option<u8>) -> Result<f64, Stri
     Err(format!("no sample of 16 bits is above {brightest}: {bits}"))
 }
 
-/// The words of an anymap's header, comments left out.
+/// The words in the header of a PGM, PPM or PAM, without comments.
 pub(super) fn header_words(header: &str) -> impl Iterator<Item = &str> {
     let lines = header.lines();
     let lines = lines.map(|line| line.split('#').next().unwrap_or(""));
@@ -456,7 +456,7 @@ pub(super) fn header_words(header: &str) -> impl Iterator<Item = &str> {
 /// The largest value of a sample that the header of a PGM, PPM or PAM announces.
 fn announced_maximum(bytes: &[u8]) -> Option<u16> {
     let kind = bytes.strip_prefix(b"P")?.first()?;
-    // No header is longer. Words beyond it are samples.
+    // No header is longer than this. Words beyond are samples.
     let header = String::from_utf8_lossy(&bytes[..bytes.len().min(4096)]);
     let mut words = header_words(&header);
     let word = match kind {
@@ -467,20 +467,20 @@ fn announced_maximum(bytes: &[u8]) -> Option<u16> {
     word?.parse().ok().filter(|&maximum| maximum > 0)
 }
 
-/// Why the samples of a binary PGM, PPM or PAM do not fit the largest value that its header
-/// announces, if one is above it. The decoder takes it for the largest.
+/// An error message if a sample of a binary PGM, PPM or PAM exceeds the maximum in its header. The
+/// decoder would clip the sample.
 fn above_maximum(bytes: &[u8], (width, height): (u32, u32)) -> Option<String> {
     let announced = announced_maximum(bytes)?;
     let channels = match bytes.get(1)? {
         b'5' => 1,
         b'6' => 3,
-        // The depth of a PAM stands in its header, and samples in text are checked by the decoder.
+        // A PAM states its depth in the header, and the decoder checks samples written as text.
         _ => return None,
     };
     let width_bytes = if announced > 255 { 2 } else { 1 };
     let samples = width as usize * height as usize * channels;
     let start = bytes.len().checked_sub(samples * width_bytes)?;
-    // Where more follows the samples, their place is not known from the end.
+    // If other data follow the samples, the position of the samples cannot be counted from the end.
     let header = String::from_utf8_lossy(&bytes[..start.min(4096)]);
     if !header.trim_end().ends_with(&announced.to_string()) {
         return None;
@@ -498,7 +498,7 @@ fn above_maximum(bytes: &[u8], (width, height): (u32, u32)) -> Option<String> {
     })
 }
 
-/// Writes an 8-bit grey image: PGM where the name ends in `.pgm`, else PNG.
+/// Writes an 8-bit grey image, as PGM if the name ends in `.pgm`, else as PNG.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -511,7 +511,8 @@ fn above_maximum(bytes: &[u8], (width, height): (u32, u32)) -> Option<String> {
 /// ```
 ///
 /// # Errors
-/// [`FileError::Write`] and [`FileError::Image`].
+/// [`FileError::Write`] if the file cannot be written, [`FileError::Image`] if the image cannot be
+/// encoded.
 pub fn write_grey_image(
     path: impl AsRef<Path>,
     pixels: ArrayView2<'_, u8>,
@@ -535,7 +536,8 @@ pub fn write_grey_image(
 /// Writes levels `[row, column, channel]` of red, green and blue as PNG.
 ///
 /// # Errors
-/// [`FileError::Write`] and [`FileError::Image`].
+/// [`FileError::Write`] if the file cannot be written, [`FileError::Image`] if the image cannot be
+/// encoded.
 pub fn write_colour_image(
     path: impl AsRef<Path>,
     levels: ArrayView3<'_, u8>,

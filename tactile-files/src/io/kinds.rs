@@ -1,8 +1,8 @@
-//! Kinds of files by their first bytes, as an error names what is there in place of what is wanted.
+//! Detects kinds of files by their first bytes, so that an error can name the kind of a wrong file.
 
 pub(super) const UTF_16: &str = "UTF-16 text";
 
-/// First bytes (where they stand, and what they are), what such a file is, and the remedy.
+/// Offset and value of the first bytes, the kind of file, and the remedy.
 const KINDS: [(usize, &[u8], &str, &str); 25] = [
     (8, b"WEBP", "a WebP image", AS_PNG),
     (0, b"\xff\xfe", UTF_16, ""),
@@ -48,7 +48,7 @@ const AS_CSV_OR_MAT: &str = ": export CSV, or save .mat by `save -v7`";
 const PIPED: &str = ", which is not read: pipe it by \
                      ffmpeg -i VIDEO -f yuv4mpegpipe -pix_fmt gray - | tactile … -";
 
-/// What begins a text that is no table, and what such a text is, with the remedy.
+/// First characters of texts that are no tables, and the kind of text with the remedy.
 const TEXTS: [(&str, &str); 5] = [
     ("P2\n", "a PGM image"),
     ("P3\n", "a PPM image"),
@@ -60,10 +60,10 @@ const TEXTS: [(&str, &str); 5] = [
     ),
 ];
 
-/// What a text is that is no table. `None` for one that may be.
+/// The kind of a text that is no table. `None` if it may be a table.
 pub(super) fn kind_of_text(bytes: &[u8]) -> Option<String> {
     let text = bytes.trim_ascii_start();
-    // A preamble may have names in brackets.
+    // A bracket alone is not enough: the preamble of a table may have names in brackets.
     let list = text.strip_prefix(b"[").map(<[u8]>::trim_ascii_start);
     let is_json = list.is_some_and(|rest| {
         rest.starts_with(b"[") || rest.first().is_some_and(|c| b"{\"-0123456789".contains(c))
@@ -74,14 +74,14 @@ pub(super) fn kind_of_text(bytes: &[u8]) -> Option<String> {
     Some((*kind).into())
 }
 
-/// Bytes of a file that are looked at: text has no control characters among them.
+/// Number of bytes that are tested. Text has no control characters among them.
 const LOOKED_AT: usize = 4096;
 
-/// What a file is that is no text. `None` for text.
+/// The kind of a file that is no text. `None` for text.
 pub(super) fn kind_of(bytes: &[u8]) -> Option<String> {
     let begins = |(at, magic, ..): &&(usize, &[u8], &str, &str)| {
         let rest = bytes.get(*at..).unwrap_or_default();
-        // Two letters may begin a text as well.
+        // A signature of two letters may be the start of a text.
         rest.starts_with(magic) && (magic.len() > 2 || !is_text(bytes) || *at > 0)
     };
     let unknown = "a binary file of an unknown kind: export it as CSV, or as PNG if it is an image";
@@ -90,11 +90,11 @@ pub(super) fn kind_of(bytes: &[u8]) -> Option<String> {
     kind.or((!is_text(bytes)).then(|| unknown.into()))
 }
 
-/// Whether a file is a text, as far as its beginning shows.
+/// Whether the first bytes of a file are text.
 pub(super) fn is_text(bytes: &[u8]) -> bool {
     let start = &bytes[..bytes.len().min(LOOKED_AT)];
     let is_control = |byte: &&u8| byte.is_ascii_control() && !byte.is_ascii_whitespace();
-    // A stray control character is the reader's to name.
+    // A single control character is left to the reader, which names its place.
     let controls = start.iter().filter(is_control).count();
     !start.contains(&0) && 10 * controls <= start.len()
 }

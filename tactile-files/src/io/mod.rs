@@ -1,4 +1,4 @@
-//! Files in and out: points, columns, grids, case files, grey images.
+//! Reads and writes files of points, columns, grids, matching cases and grey images.
 //!
 //! | read by | what |
 //! |---|---|
@@ -11,16 +11,16 @@
 //! | [`read_normal_map`] | normals of a surface, as images or arrays |
 //! | [`FrameReader`] | frames of videos, pipes, arrays and stacks of images, one after the other |
 //!
-//! Tables are text, or arrays of numbers in `.npy`, `.npz` and `.mat` (version 5). In text, cells are
-//! separated by commas, semicolons, tabs or blanks, and may stand in double quotes. Decimal commas
-//! are known where commas do not separate. A first line without any number is a heading, and so is
-//! the comment before the first row if it names the columns. Empty lines and lines that start with
-//! `#` or `%` are passed over. Units in headings are converted to SI (m, N, Pa, s) or refused.
+//! Tables are text, or arrays of numbers in `.npy`, `.npz` and `.mat` (version 5). In text, cells
+//! are separated by commas, semicolons, tabs or blanks, and may stand in double quotes. Decimal
+//! commas are recognised if commas do not separate cells. A first line without any number is a
+//! heading. A comment before the first row is a heading too if it names the columns. Empty lines
+//! and lines that start with `#` or `%` are skipped. Units in headings are converted to SI (m, N,
+//! Pa, s) or refused.
 //!
-//! Whatever is wrong with a file is a [`FileError`]: one sentence with the file, the place, what
-//! was expected and what was found. No content makes a reader panic, and none makes it ask for more
-//! memory than a few times the size of the file. A file that is written takes the place of an older
-//! one only when it is complete.
+//! Every fault of a file is a [`FileError`]: one sentence with the file, the place, the expected
+//! and the found content. Readers do not panic on any content, and their memory is limited to a few
+//! times the size of the file. A new file replaces an older one only when it is complete.
 mod cases;
 mod columns;
 mod error;

@@ -22,7 +22,7 @@ use std::path::Path;
 /// ```
 ///
 /// # Errors
-/// [`FileError`] where the file cannot be read or holds no colours or vectors.
+/// [`FileError`] if the file cannot be read or holds no colours or vectors.
 pub fn read_normal_map(path: impl AsRef<Path>) -> Result<Array3<f64>, FileError> {
     let path = path.as_ref();
     let bytes = read_bytes(path)?;

@@ -1,7 +1,7 @@
 //! Arrays of numbers as tables: `.npy` and `.npz` of NumPy, and `.mat` of version 5.
 //!
-//! Own readers of small headers: `ndarray-npy` takes one type of numbers an array, known
-//! beforehand, and no well-kept crate reads `.mat`.
+//! The readers are our own, because `ndarray-npy` needs the number type of an array beforehand and
+//! no well-kept crate reads `.mat`.
 use super::error::{FileError, FilePlace, quoted};
 use super::files::LARGEST_FILE;
 use super::frames::{ARRAY_STARTS, header_fields, members};
@@ -14,7 +14,7 @@ use std::path::Path;
 /// First bytes of a `.mat` file of version 5.
 const MAT_5: &[u8] = b"MATLAB 5.0";
 
-/// An array, its numbers in the order of C.
+/// An array with its numbers in C order.
 struct Array {
     name: String,
     shape: Vec<usize>,
@@ -22,7 +22,7 @@ struct Array {
 }
 
 impl Array {
-    /// Rows and columns: an array of one axis is a column.
+    /// Rows and columns. An array of one axis is a column.
     fn sides(&self) -> Option<(usize, usize)> {
         match *self.shape {
             [rows] => Some((rows, 1)),
@@ -32,8 +32,8 @@ impl Array {
     }
 }
 
-/// How numbers are stored: letter of the kind (`f`, `i`, `u`, `b`), bytes, and whether the highest
-/// byte comes first.
+/// Storage of numbers: letter of the kind (`f`, `i`, `u`, `b`), size in bytes, and whether the
+/// highest byte comes first.
 type Kind = (u8, usize, bool);
 
 fn numbers(bytes: &[u8], (letter, size, big_endian): Kind) -> Option<Vec<f64>> {
@@ -61,7 +61,7 @@ fn numbers(bytes: &[u8], (letter, size, big_endian): Kind) -> Option<Vec<f64>> {
     bytes.chunks_exact(size).map(number).collect()
 }
 
-/// An array of this shape, unless its numbers are not all there.
+/// An array of this shape. `None` if numbers are missing.
 fn array(name: &str, shape: &[usize], by_columns: bool, values: Vec<f64>) -> Option<Array> {
     let name = quoted(name.strip_suffix(".npy").unwrap_or(name), 40);
     let length = shape
@@ -86,7 +86,7 @@ fn array(name: &str, shape: &[usize], by_columns: bool, values: Vec<f64>) -> Opt
     })
 }
 
-/// The array of a `.npy` file, `None` for one of no numbers.
+/// The array of a `.npy` file. `None` if it holds no numbers.
 fn of_npy(name: &str, bytes: &[u8]) -> Option<Array> {
     let wide = *bytes.get(6)? > 1;
     let start = if wide { 12 } else { 10 };
@@ -105,7 +105,7 @@ fn of_npy(name: &str, bytes: &[u8]) -> Option<Array> {
     )
 }
 
-/// The arrays of a `.mat` file, without those of other kinds.
+/// The numeric arrays of a `.mat` file.
 fn of_mat(bytes: &[u8]) -> Vec<Array> {
     let big_endian = bytes.get(126) == Some(&b'M');
     let mut rest = bytes.get(128..).unwrap_or_default();
@@ -115,7 +115,7 @@ fn of_mat(bytes: &[u8]) -> Vec<Array> {
         let mut inside = element;
         if kind == 15 {
             let mut packed = ZlibDecoder::new(element).take(LARGEST_FILE);
-            // What can be unpacked of a damaged element shows that it is cut.
+            // A damaged element is unpacked as far as possible. It is then found to be too short.
             let _ = packed.read_to_end(&mut unpacked);
             inside = &unpacked;
             let Some((14, matrix)) = self::element(&mut inside, big_endian) else {
@@ -140,7 +140,7 @@ fn element<'a>(rest: &mut &'a [u8], big_endian: bool) -> Option<(u32, &'a [u8])>
         })
     };
     let (kind, size) = (word(0)?, word(4)?);
-    // A small one has its size and kind in four bytes, its content in the next four.
+    // A small element has its size and kind in four bytes and its content in the next four.
     let (kind, from, size, whole) = match kind >> 16 {
         0 => (
             kind,
@@ -151,7 +151,7 @@ fn element<'a>(rest: &mut &'a [u8], big_endian: bool) -> Option<(u32, &'a [u8])>
         small => (kind & 0xffff, 4, small as usize, 8),
     };
     let content = all.get(from..from + size)?;
-    // A compressed element is not filled up.
+    // A compressed element has no padding.
     let whole = if kind == 15 { 8 + size } else { whole };
     *rest = all.get(whole..).unwrap_or_default();
     Some((kind, content))
@@ -164,7 +164,7 @@ fn matrix(mut rest: &[u8], big_endian: bool) -> Option<Array> {
     } else {
         flags.first()
     };
-    // Cells, structures, objects, text, sparse matrices and complex numbers are no tables.
+    // Cells, structures, objects, text, sparse matrices and complex numbers are not tables.
     let complex = flags.get(if big_endian { 2 } else { 1 })? & 8 != 0;
     if complex || !(6..=15).contains(class?) {
         return None;
@@ -172,7 +172,7 @@ fn matrix(mut rest: &[u8], big_endian: bool) -> Option<Array> {
     let (_, sides) = element(&mut rest, big_endian)?;
     let sides = numbers(sides, (b'i', 4, big_endian))?;
     let mut shape: Vec<usize> = sides.iter().map(|side| side.max(0.0) as usize).collect();
-    // A row vector of MATLAB is a column here.
+    // A row vector of MATLAB is read as a column.
     if shape.len() == 2 && shape[0] == 1 {
         shape.remove(0);
     }
@@ -195,7 +195,7 @@ fn matrix(mut rest: &[u8], big_endian: bool) -> Option<Array> {
     array(&String::from_utf8_lossy(name), &shape, true, values)
 }
 
-/// The arrays of a file of NumPy or MATLAB. `None` for what is neither.
+/// The arrays of a NumPy or MATLAB file. `None` for other files.
 fn arrays(bytes: &[u8]) -> Option<Vec<Array>> {
     if bytes.starts_with(ARRAY_STARTS[0]) {
         return Some(of_npy("", bytes).into_iter().collect());
@@ -206,21 +206,22 @@ fn arrays(bytes: &[u8]) -> Option<Vec<Array>> {
     if !bytes.starts_with(ARRAY_STARTS[1]) {
         return None;
     }
-    // A spreadsheet is an archive, too.
+    // A spreadsheet is a zip archive too.
     let mut files = members(bytes, LARGEST_FILE).unwrap_or_default();
     files.retain(|(name, _)| name.ends_with(".npy"));
     let arrays = files.iter().filter_map(|(name, bytes)| of_npy(name, bytes));
     (!files.is_empty()).then(|| arrays.collect())
 }
 
-/// The cells of arrays: of one array, or of several columns of one length, each by its name. `None`
-/// for what holds no arrays.
+/// The cells of one array, or of several named columns of equal length. `None` if the file holds no
+/// arrays.
 pub(super) fn cells(bytes: &[u8], path: &Path) -> Option<Result<TextCells, FileError>> {
     let expected = "one array of numbers of two axes, or several of one axis and length";
     let refused = |found: String| FileError::content(path, FilePlace::File, expected, found);
     let mut arrays = arrays(bytes)?;
     arrays.retain(|array| array.sides().is_some());
-    // A frame rate or another setting beside a table is no part of it, even if the table is empty.
+    // A single number beside a table, such as a frame rate, is not part of the table, even if the
+    // table is empty.
     for is_table in [|length| length > 1, |length| length == 0] {
         if arrays.iter().any(|array| is_table(array.values.len())) {
             arrays.retain(|array| is_table(array.values.len()));
@@ -232,7 +233,7 @@ pub(super) fn cells(bytes: &[u8], path: &Path) -> Option<Result<TextCells, FileE
         [] if bytes.starts_with(ARRAY_STARTS[0]) => {
             let header = String::from_utf8_lossy(&bytes[..bytes.len().min(140)]);
             let from = header.find('{').unwrap_or(0);
-            // An array of records has a list of its columns.
+            // The header of a structured array lists its columns.
             let remedy = match header.contains("'descr': [") {
                 true => "save its columns by numpy.savez",
                 false => "save it by `astype(float)`",
@@ -280,7 +281,8 @@ pub(super) fn cells(bytes: &[u8], path: &Path) -> Option<Result<TextCells, FileE
     Some(Ok(table))
 }
 
-/// The array of vectors in a file of arrays, `[row, column, axis]`. `None` for what holds no arrays.
+/// The array of vectors in a file of arrays, `[row, column, axis]`. `None` if the file holds no
+/// arrays.
 pub(super) fn vectors(bytes: &[u8], path: &Path) -> Option<Result<Array3<f64>, FileError>> {
     let found = arrays(bytes)?
         .into_iter()

@@ -1,13 +1,13 @@
-//! What a sensor, its objects and its forces can be: a value beyond is a slip of the unit.
+//! Plausible ranges of sizes, moduli and forces. A value outside is likely in a wrong unit.
 use super::files::number;
 use serde::de::{self, Deserialize, Deserializer};
 
-/// A quantity that enters by hand, with the values that an optical tactile sensor or its objects
-/// can have.
+/// A quantity that users enter by hand, with its plausible range for an optical tactile sensor and
+/// its objects.
 ///
 /// ```
 /// use tactile_files::io::InputQuantity;
-/// // 3 mm, and 3 m where metres are asked for.
+/// // 3 mm is a plausible length, 3 m is not.
 /// assert!(InputQuantity::Length.allows(3e-3) && !InputQuantity::Length.allows(3.0));
 /// assert!(InputQuantity::Modulus.allows(60e3) && !InputQuantity::Modulus.allows(f64::NAN));
 /// assert!(InputQuantity::PixelSide.allows(40e-6));
@@ -33,13 +33,13 @@ impl InputQuantity {
     #[must_use]
     pub fn limits(self) -> [f64; 2] {
         match self {
-            // From the thinnest film to a block as wide as a hand is long.
+            // From the thinnest film to a block of one metre.
             Self::Length => [1e-7, 1.0],
             // From a microscope's pixel to one that spans a small sensor.
             Self::PixelSide => [1e-8, 5e-3],
             // From the softest gel to beyond diamond.
             Self::Modulus => [1.0, 1e13],
-            // Beyond this no gel is left.
+            // No gel survives more.
             Self::Force => [1e-9, 1e3],
         }
     }
@@ -79,7 +79,7 @@ pub(crate) fn force<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, 
     })
 }
 
-/// Width and height of a pixel, of which neither is ten times the other.
+/// Width and height of a pixel. Their ratio is at most ten.
 pub(crate) fn pixel_size<'de, D: Deserializer<'de>, T: From<[f64; 2]>>(
     d: D,
 ) -> Result<T, D::Error> {

@@ -8,19 +8,19 @@ use nalgebra::{Point, Point2, Point3};
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
 
-/// What becomes of rows without a number.
+/// Treatment of rows with missing numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Gaps {
-    /// They are left out and counted.
+    /// The rows are left out and counted.
     #[default]
     LeaveOut,
-    /// The table is refused.
+    /// The table is refused with an error.
     Refuse,
-    /// NaN stands for the number: a row then is a row of other tables.
+    /// The number becomes NaN, so that rows still correspond to those of other tables.
     Keep,
 }
 
-/// How a table is read, if not as it shows itself.
+/// Options of reading a table, for tables that are not recognised automatically.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -38,12 +38,12 @@ pub enum Gaps {
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TableOptions {
-    /// The columns that are wanted, in their order, by heading or by number from 1. Empty: they are
-    /// found by their usual names.
+    /// The wanted columns in order, by heading or by number from 1. If empty, columns are found by
+    /// their usual names.
     pub columns: Vec<String>,
-    /// Lines before the table, of an instrument's preamble.
+    /// Number of lines before the table, such as an instrument's preamble.
     pub skip_lines: usize,
-    /// What becomes of rows without a number in a wanted column.
+    /// Treatment of rows without a number in a wanted column.
     pub gaps: Gaps,
 }
 
@@ -63,11 +63,11 @@ pub struct TableOptions {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Table {
-    /// Names of the columns, empty where the file has no header line.
+    /// Names of the columns. Empty if the file has no header line.
     pub header: Vec<String>,
     /// The numbers, `[row, column]`. NaN if a cell holds none.
     pub values: Array2<f64>,
-    /// What was taken for granted, a sentence each.
+    /// Assumptions that were made while reading, one sentence each.
     pub notes: Vec<String>,
     /// The rows of the columns that were read last.
     pub rows: Vec<usize>,
@@ -78,12 +78,12 @@ pub struct Table {
 }
 
 impl Table {
-    /// Columns in SI units, as [`read_columns`] finds them, without the rows that have no number in
-    /// one of them.
+    /// Columns in SI units, found as in [`read_columns`]. Rows without a number in one of them are
+    /// left out.
     ///
     /// # Errors
-    /// [`FileError::Content`] for a column that is missing, there twice or in an unknown unit, for a
-    /// word in place of a number, and for rows without a number if they are not left out.
+    /// [`FileError::Content`] if a column is missing, occurs twice or has an unknown unit, if a
+    /// word stands in place of a number, or if a number is missing and [`Gaps::Refuse`] is set.
     pub fn columns<const N: usize>(
         &mut self,
         wanted: [(&[&str], &str); N],
@@ -113,8 +113,7 @@ impl Table {
         for ((names, unit), at) in wanted.iter().zip(places) {
             let name = names.first().copied().unwrap_or_default();
             let given = headings.get(at).and_then(|heading| heading.unit.as_deref());
-            // The wanted unit stands for its quantity: any multiple of its base may stand in the
-            // file.
+            // The wanted unit defines the quantity. The file may use any multiple of its base unit.
             let (base, _) = in_si(unit).unwrap_or(("1", 1.0));
             let factor = match in_si(given.unwrap_or(unit)) {
                 Some((found, factor)) if found == base => factor,
@@ -136,7 +135,7 @@ impl Table {
         Ok(found)
     }
 
-    /// The column that the options name in this place.
+    /// The column that the options name for this position.
     fn chosen(&self, position: usize, count: usize) -> Result<usize, FileError> {
         let names = &self.options.columns;
         if names.len() != count {
@@ -228,10 +227,10 @@ impl Table {
 
 /// Reads columns of a CSV file in SI units.
 ///
-/// Each column is wanted by the names it may have, the usual one first and without the unit, and by
-/// the unit it has where the file names none. A file with a header may have other columns, and
-/// units in its headings (`depth_um`, `force (mN)`). A unit of another quantity than the given one
-/// is an error. A file without a header has exactly these columns, in this order.
+/// Each wanted column is given by its possible names without the unit, the usual one first, and by
+/// the unit to assume if the file states none. A file with a header may have other columns, and
+/// units in its headings (`depth_um`, `force (mN)`). A unit of another quantity is an error. A file
+/// without a header must have exactly these columns, in this order.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -247,8 +246,8 @@ impl Table {
 /// ```
 ///
 /// # Errors
-/// [`FileError`] where the file cannot be read, a field is no finite number, rows differ in length,
-/// a column is not there or there twice, or its unit is not one of its quantity.
+/// [`FileError`] if the file cannot be read, a field is not a finite number, rows differ in length,
+/// a column is missing or occurs twice, or its unit belongs to another quantity.
 pub fn read_columns<const N: usize>(
     path: impl AsRef<Path>,
     wanted: [(&[&str], &str); N],
@@ -259,16 +258,16 @@ pub fn read_columns<const N: usize>(
 /// Reads a table of numbers with rows of one length: text, `.npy`, `.npz` or `.mat`.
 ///
 /// # Errors
-/// [`FileError`] where the file cannot be read, is another kind of file, rows differ in length, or
-/// there are none.
+/// [`FileError`] if the file cannot be read, is no table, has rows of different length or has no
+/// rows.
 pub fn read_table(path: impl AsRef<Path>) -> Result<Table, FileError> {
     read_table_with(path, &TableOptions::default())
 }
 
-/// As [`read_table`], with options.
+/// Does the same as [`read_table`], with options.
 ///
 /// # Errors
-/// As [`read_table`].
+/// The errors of [`read_table`].
 pub fn read_table_with(path: impl AsRef<Path>, options: &TableOptions) -> Result<Table, FileError> {
     let path = path.as_ref();
     let bytes = read_bytes(path)?;
@@ -300,7 +299,7 @@ pub fn read_table_with(path: impl AsRef<Path>, options: &TableOptions) -> Result
     Ok(table)
 }
 
-/// Options of what a program's own code reads: no row is left out unseen.
+/// Options for [`read_columns`], which does not report rows that are left out: it refuses them.
 fn strict() -> TableOptions {
     TableOptions {
         gaps: Gaps::Refuse,
@@ -323,11 +322,11 @@ fn strict() -> TableOptions {
 /// ```
 ///
 /// # Errors
-/// [`FileError`], see the [module](super).
+/// [`FileError`] if the file cannot be read or is not such a table.
 pub fn read_grid(path: impl AsRef<Path>) -> Result<Array2<f64>, FileError> {
     let table = read_table(path)?;
     let expected = "a number, `nan` or an empty cell";
-    // A matrix has no names. A line of words is the header of another kind of table.
+    // A matrix has no header. A line of words shows another kind of table.
     let word = table.header.first().map(|word| (1, word.clone()));
     let words = table.words.iter().enumerate();
     let words = words.filter_map(|(column, word)| Some((column + 1, word.clone()?)));
@@ -339,12 +338,12 @@ pub fn read_grid(path: impl AsRef<Path>) -> Result<Array2<f64>, FileError> {
     Ok(table.values)
 }
 
-/// Points of a file whose number of coordinates is not known beforehand.
+/// Points of a file that may have two or three coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PointTable {
-    /// Points of two coordinates.
+    /// Points with two coordinates.
     Plane(Vec<Point2<f64>>),
-    /// Points of three coordinates.
+    /// Points with three coordinates.
     Space(Vec<Point3<f64>>),
 }
 
@@ -352,22 +351,23 @@ pub enum PointTable {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Points {
-    /// The points, in metres if the table names a unit of lengths, else in its own unit.
+    /// The points, in metres if the table states a unit of length, else in the table's unit.
     pub points: PointTable,
-    /// Where they go, if displacements are read too.
+    /// The displaced points, if displacements are read too.
     pub displaced: Option<PointTable>,
-    /// Whether they are in metres.
+    /// Whether the points are in metres.
     pub metric: bool,
-    /// The row of each in its table, from 0.
+    /// The row of each point in the table, from 0.
     pub rows: Vec<usize>,
-    /// What was taken for granted, a sentence each.
+    /// Assumptions that were made while reading, one sentence each.
     pub notes: Vec<String>,
-    /// Rows of the table, those without numbers included.
+    /// Number of rows of the table, including those without numbers.
     table_rows: usize,
 }
 
 impl Points {
-    /// Of two tables of as many rows, keeps the points whose row has numbers in both.
+    /// If both tables have the same number of rows, keeps the points whose rows are complete in
+    /// both.
     pub fn keep_shared_rows(&mut self, other: &mut Self) {
         if self.table_rows != other.table_rows || self.rows == other.rows {
             return;
@@ -395,9 +395,9 @@ impl Points {
     }
 }
 
-/// Reads points with two or three coordinates, as many as the file has. A table of tracked points
-/// with a column of frames gives the points of each frame, in ascending order, none for a frame
-/// whose rows have no numbers.
+/// Reads points with two or three coordinates, depending on the file. A table of tracked points
+/// with a column of frame numbers gives one set of points per frame, in ascending order. The set is
+/// empty if no row of the frame is complete.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -412,7 +412,7 @@ impl Points {
 /// ```
 ///
 /// # Errors
-/// [`FileError`], see the [module](super).
+/// [`FileError`] if the file cannot be read or is not such a table.
 pub fn read_point_frames(
     path: impl AsRef<Path>,
     options: &TableOptions,
@@ -442,9 +442,9 @@ pub fn read_point_frames(
     Ok(frames.iter().map(|kept| whole.only(kept)).collect())
 }
 
-/// Reads points and where they go: columns `x`, `y` and, in space, `z` with the displacements `u`,
-/// `v` and `w` (also `u_x` and `displacement_x`), in one unit. Columns that are chosen are four, or
-/// six in space.
+/// Reads points and their displacements: columns `x`, `y` and, in space, `z` with the displacements
+/// `u`, `v` and `w` (also `u_x` and `displacement_x`), in one unit. Options must choose four
+/// columns, or six in space.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -459,7 +459,7 @@ pub fn read_point_frames(
 /// ```
 ///
 /// # Errors
-/// [`FileError`], among others where a displacement has no column or another unit.
+/// [`FileError`], for example if a displacement has no column or another unit.
 pub fn read_displaced_points(
     path: impl AsRef<Path>,
     options: &TableOptions,
@@ -467,7 +467,7 @@ pub fn read_displaced_points(
     points_of(&mut read_table_with(path, options)?, true)
 }
 
-/// Points of a table, with their displacements if these are wanted.
+/// Points of a table, with their displacements if `displaced` is set.
 fn points_of(table: &mut Table, displaced: bool) -> Result<Points, FileError> {
     let (headings, chosen) = (table.headings(), table.options.columns.len());
     let found = axes(&headings);
@@ -491,7 +491,7 @@ fn points_of(table: &mut Table, displaced: bool) -> Result<Points, FileError> {
         );
         return Err(table.error(FilePlace::Line(1), expected, count.to_string()));
     }
-    // Positions of tracked points are often in pixels, which have no length here.
+    // Tracked points are often in pixels, which cannot be converted to metres.
     let first = found.first().copied();
     let in_pixels = first.is_some_and(Heading::is_in_pixels);
     let metric = first.is_some_and(|x| x.unit.is_some() && !in_pixels);
@@ -509,7 +509,7 @@ fn points_of(table: &mut Table, displaced: bool) -> Result<Points, FileError> {
         .chain(displacements.copied());
     let wanted: Vec<(&[&str], &str)> = wanted.map(|names| (names, unit)).collect();
     if chosen == 0 && !headings.is_empty() {
-        // A unit beside one number and none beside another leaves open what the other is in.
+        // If only some columns state a unit, the unit of the others is unclear.
         let with_unit = |(names, _): &(&[&str], &str)| {
             let known = headings.iter().find(|h| names.contains(&h.name.as_str()));
             known.map(|heading| heading.unit.is_some())
@@ -555,10 +555,10 @@ fn points_of(table: &mut Table, displaced: bool) -> Result<Points, FileError> {
     })
 }
 
-/// Reads points with `D` coordinates, a row each.
+/// Reads points with `D` coordinates, one per row.
 ///
-/// With a header the columns `x`, `y` and, in space, `z` are found by name, other columns (an `id`)
-/// are passed over, and units (`x_um`, `y (mm)`) are converted to metres. Pixels (`x_px`) stay
+/// With a header the columns `x`, `y` and, in space, `z` are found by name, and other columns (such
+/// as `id`) are skipped. Units (`x_um`, `y (mm)`) are converted to metres. Pixels (`x_px`) stay
 /// pixels. A file without a header has `D` columns in any unit.
 ///
 /// ```
@@ -575,7 +575,7 @@ fn points_of(table: &mut Table, displaced: bool) -> Result<Points, FileError> {
 /// ```
 ///
 /// # Errors
-/// [`FileError`], among others where the file has not `D` columns.
+/// [`FileError`], for example if the file does not have `D` columns.
 pub fn read_points<const D: usize>(
     path: impl AsRef<Path>,
 ) -> Result<Vec<Point<f64, D>>, FileError> {

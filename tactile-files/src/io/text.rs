@@ -1,28 +1,28 @@
-//! Tables in text: what separates their cells, where their heading stands, and their numbers.
+//! Tables in text: finds the separator of the cells, the heading and the numbers.
 use super::columns::{Heading, axes, in_si};
 use super::error::{FileError, FilePlace, quoted};
 use super::kinds::{UTF_16, kind_of, kind_of_text};
 use std::borrow::Cow;
 use std::path::Path;
 
-/// Lines among which the rows of a table are looked for. Preambles of instruments are shorter.
+/// Number of lines that are searched for the rows of a table. Preambles of instruments are shorter.
 const LONGEST_PREAMBLE: usize = 1000;
 
-/// Lines of names, long names and units below the first heading (TrackMate has three).
+/// Largest number of further heading lines below the first (TrackMate writes three).
 const MOST_FURTHER_HEADINGS: usize = 3;
 
-/// Rows that show whether a program writes every number with its decimals.
+/// Number of rows that are tested for whether all numbers have decimals.
 const ROWS_LOOKED_AT: usize = 20;
 
-/// Words for a number that is not there: of pandas, R, Labview and Windows.
+/// Words for a missing number in pandas, R, LabVIEW and Windows.
 const MISSING: [&str; 8] = ["", "na", "n/a", "null", "none", "-", "1.#qnan", "-1.#ind"];
 
-/// What spreadsheets write into such a cell. Comments begin with the same sign.
+/// Words of spreadsheets for a missing number. They begin with `#`, as comments do.
 const SHEET_ERRORS: [&str; 7] = [
     "#n/a", "#div/0!", "#num!", "#value!", "#ref!", "#null!", "#name?",
 ];
 
-/// What lines of comments begin with: numpy, MATLAB, C, DICe.
+/// First characters of comment lines in NumPy, MATLAB, C and DICe.
 const COMMENTS: [&str; 4] = ["#", "%", "//", "***"];
 
 /// The cells of a table, row by row.
@@ -32,9 +32,9 @@ pub(super) struct TextCells {
     /// NaN if a cell holds no number.
     pub values: Vec<f64>,
     pub columns: usize,
-    /// Line of the first cell of each column without a number.
+    /// For each column, the line of the first cell without a number.
     pub missing: Vec<Option<u64>>,
-    /// Line of the first cell of each column with a word in place of a number, and the word.
+    /// For each column, the first word in place of a number, and its line.
     pub words: Vec<Option<(u64, String)>>,
     /// What was taken for granted, a sentence each.
     pub notes: Vec<String>,
@@ -43,7 +43,7 @@ pub(super) struct TextCells {
 /// A line with its number, from 1.
 type Line<'a> = (u64, &'a str);
 
-/// The lines of a text from some line on.
+/// The lines of a text from a given line on.
 struct Lines<'a> {
     text: &'a str,
     end: char,
@@ -52,7 +52,7 @@ struct Lines<'a> {
 
 impl<'a> Lines<'a> {
     fn new(text: &'a str, skipped: usize) -> Self {
-        // Old spreadsheets end lines with a carriage return alone.
+        // Old spreadsheets end lines with only a carriage return.
         let end = if text.contains('\n') { '\n' } else { '\r' };
         let text = text.trim_end_matches('\u{1a}');
         Self { text, end, skipped }
@@ -63,7 +63,7 @@ impl<'a> Lines<'a> {
         lines.map(|(at, line)| (at as u64 + 1, line.trim_end_matches('\r')))
     }
 
-    /// Without empty lines, comments and a spreadsheet's note of its separator.
+    /// The lines without empty lines, comments and a spreadsheet's `sep=` line.
     fn content(&self) -> impl Iterator<Item = Line<'a>> + Clone + use<'a> {
         let passed_over =
             |line: &str| line.trim().is_empty() || is_comment(line) || line.starts_with("sep=");
@@ -86,11 +86,11 @@ enum Separator {
     Blanks,
 }
 
-/// Signs that separate cells.
+/// Characters that separate cells.
 const SIGNS: [char; 4] = [';', '\t', '|', ','];
 
 impl Separator {
-    /// Cuts a line into its cells, without blanks and quotes around them.
+    /// Splits a line into its cells and strips blanks and quotes.
     fn split<'a>(self, line: &'a str, cells: &mut Vec<&'a str>) {
         cells.clear();
         let cuts = |c: char| match self {
@@ -120,7 +120,7 @@ impl Separator {
         cells
     }
 
-    /// That of a row of numbers, which may have decimal commas.
+    /// The separator of a row of numbers, which may have decimal commas.
     fn of(row: &str) -> Self {
         let decimal = |word: &str| {
             !word.starts_with(',') && !word.ends_with(',') && number(word, true).is_some()
@@ -134,7 +134,7 @@ impl Separator {
     }
 }
 
-/// Number of the words of a line, if at least half of them are numbers.
+/// Number of words in a line, if at least half of them are numbers.
 fn numbers(line: &str) -> Option<usize> {
     let words = line.split([',', ';', '\t', ' ', '|']);
     let words = words.map(|word| word.trim_matches(['"', '\'']));
@@ -148,13 +148,13 @@ fn numbers(line: &str) -> Option<usize> {
 
 fn parse(cell: &str) -> Option<f64> {
     cell.parse().ok().or_else(|| {
-        // Exponents of Fortran, and the minus sign of typeset text.
+        // Fortran writes exponents with D, and typeset text has its own minus sign.
         let plain = cell.replace(['D', 'd'], "e").replace('−', "-");
         plain.parse().ok().filter(|_| plain != cell)
     })
 }
 
-/// A number, NaN for one that is not there. `None` for a word, and for an infinite number.
+/// A number, or NaN if it is missing. `None` for a word or an infinite number.
 fn number(cell: &str, comma: bool) -> Option<f64> {
     let with_point = || parse(&cell.replacen(',', ".", 1)).filter(|_| comma);
     let missing = || {
@@ -166,18 +166,19 @@ fn number(cell: &str, comma: bool) -> Option<f64> {
     value.filter(|value: &f64| !value.is_infinite())
 }
 
-/// How the rows of a table lie in their lines.
+/// Layout of the rows of a table.
 struct Layout {
     separator: Separator,
-    /// Whether a decimal point may be a comma.
+    /// Whether a comma may be the decimal point.
     comma: bool,
     columns: usize,
-    /// The first cell of each row is its name, which has no heading (R, pandas).
+    /// Whether the first cell of each row is its name, without a heading (R, pandas).
     named_rows: bool,
 }
 
 impl Layout {
-    /// The most frequent number of words shows the rows: a preamble may have numbers, too.
+    /// The most frequent number of words per line marks the rows, because a preamble may have
+    /// numbers too.
     fn of(lines: &Lines<'_>, first: &str) -> Self {
         let rows: Vec<(&str, usize)> = lines
             .content()
@@ -196,7 +197,7 @@ impl Layout {
         let separator = Separator::of(row.trim());
         let cells = separator.cells(row);
         let heading = separator.cells(first).len();
-        // Rows may end with a separator that their heading does not have.
+        // Rows may end with a separator although their heading does not.
         let trails = cells.last() == Some(&"") && heading + 1 == cells.len();
         Self {
             separator,
@@ -206,25 +207,25 @@ impl Layout {
         }
     }
 
-    /// Cuts a row into its cells.
+    /// Splits a row into its cells.
     fn split<'a>(&self, line: &'a str, cells: &mut Vec<&'a str>) {
         self.separator.split(line, cells);
         if self.named_rows && !cells.is_empty() {
             cells.remove(0);
         }
-        // A separator at the end of each line makes one more, empty cell.
+        // A separator at the end of the line adds an empty cell.
         if cells.len() == self.columns + 1 && cells.last() == Some(&"") {
             cells.pop();
         }
     }
 
-    /// Whether cells are a heading: words, and no number.
+    /// Whether cells are a heading, which has words and no numbers.
     fn is_heading(&self, cells: &[&str]) -> bool {
         let is_word = |cell: &&str| !cell.is_empty() && number(cell, self.comma).is_none();
         cells.iter().all(|cell| cell.is_empty() || is_word(cell)) && cells.iter().any(is_word)
     }
 
-    /// The heading that a line holds: it may be separated otherwise than the rows.
+    /// The heading in a line. Its separator may differ from that of the rows.
     fn heading(&self, line: &str) -> Option<Vec<String>> {
         let signs = SIGNS.map(Separator::Sign);
         let separators = [self.separator]
@@ -236,8 +237,9 @@ impl Layout {
         Some(cells.iter().map(|cell| quoted(cell, 40)).collect())
     }
 
-    /// Whether a first line numbers the columns from 0, as pandas does for arrays: below an empty cell
-    /// above the names of the rows, or above rows of which every number has its decimals.
+    /// Whether the first line numbers the columns from 0, as pandas does for arrays. Such a line
+    /// either starts with an empty cell, above the names of the rows, or is followed by rows in
+    /// which every number has decimals.
     fn numbers_columns<'a>(&self, cells: &[&str], below: impl Iterator<Item = &'a str>) -> bool {
         let names = cells.strip_prefix(&[""]).unwrap_or(cells);
         let counted = names
@@ -254,7 +256,7 @@ impl Layout {
         names.len() > 1 && counted && is_above()
     }
 
-    /// A sentence on the line where the table begins, if its rows begin later than its first line.
+    /// A hint about the line where the table begins, if rows are found further down.
     fn remedy(&self, lines: &Lines<'_>, first: u64) -> String {
         let width = |line: &str| self.separator.cells(line).len();
         let is_row = |line: &str| numbers(line).is_some() && width(line) == self.columns;
@@ -275,8 +277,8 @@ impl Layout {
     }
 }
 
-/// Whether a comment may be the heading of as many columns as it has words, and whether it is one
-/// even if their number differs.
+/// Whether a comment may be the heading if its number of words fits the columns, and whether it is
+/// the heading even if the number differs.
 fn names_columns(text: &str) -> [bool; 2] {
     let words: Vec<&str> = match text.contains(SIGNS) {
         true => text.split(SIGNS).collect(),
@@ -290,7 +292,8 @@ fn names_columns(text: &str) -> [bool; 2] {
     [known > 1, known > 1 && !sentence]
 }
 
-/// A file as text. What is no UTF-8 is read as Latin-1, whose micro sign stands in many headings.
+/// A file as text. Bytes that are not UTF-8 are read as Latin-1, whose micro sign occurs in many
+/// headings.
 fn decoded<'a>(bytes: &'a [u8], path: &Path, skip_lines: usize) -> Result<Cow<'a, str>, FileError> {
     if let Some(kind) = kind_of(bytes).or_else(|| kind_of_text(bytes).filter(|_| skip_lines == 0)) {
         let expected = match kind.as_str() {
@@ -312,7 +315,7 @@ fn decoded<'a>(bytes: &'a [u8], path: &Path, skip_lines: usize) -> Result<Cow<'a
 /// Reads the cells of a table from the line after `skip_lines`.
 ///
 /// # Errors
-/// [`FileError::Content`] for what is no text, and for rows of another length than the others.
+/// [`FileError::Content`] if the file is not text or its rows differ in length.
 pub(super) fn cells(bytes: &[u8], path: &Path, skip_lines: usize) -> Result<TextCells, FileError> {
     let text = decoded(bytes, path, skip_lines)?;
     let lines = Lines::new(&text, skip_lines);
@@ -328,7 +331,7 @@ pub(super) fn cells(bytes: &[u8], path: &Path, skip_lines: usize) -> Result<Text
             found,
         )
     };
-    // Elastix begins with the kind of its points and their number.
+    // Files of Elastix begin with the kind and the number of points.
     let kind = ["point", "index"].contains(&first_line.trim());
     let is_count = |line: &str| line.trim().parse::<usize>().is_ok();
     let mut rows = lines.content().skip(usize::from(kind)).peekable();
@@ -426,7 +429,7 @@ pub(super) fn cells(bytes: &[u8], path: &Path, skip_lines: usize) -> Result<Text
 }
 
 impl TextCells {
-    /// Takes the last of these lines as the heading, if it is a comment that names the columns.
+    /// Uses the last of these lines as the heading if it is a comment that names the columns.
     fn heading_of_comment<'a>(
         &mut self,
         layout: &Layout,
@@ -464,8 +467,9 @@ impl TextCells {
         Ok(())
     }
 
-    /// Takes a line of words below the heading for units, longer names, or the names of columns whose
-    /// groups stand above (pandas, DeepLabCut). False for words in place of numbers.
+    /// Reads a line of words below the heading as units, longer names, or names of columns whose
+    /// groups stand above (pandas, DeepLabCut). Returns false if the words stand in place of
+    /// numbers.
     fn further_heading(&mut self, line: u64, cells: &[&str], below_others: bool) -> bool {
         let has_axes = |names: &mut dyn Iterator<Item = &str>| {
             axes(&names.map(Heading::of).collect::<Vec<_>>()).len() > 1

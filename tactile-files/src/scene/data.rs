@@ -1,4 +1,4 @@
-//! The files of a scene, read and checked against each other, and a pipeline with its frames.
+//! Reads the files of a scene, checks them against each other, and builds the pipeline.
 use super::file::guide;
 use super::{CalibrationSource, Scene, read_contact_table};
 use crate::io::{FileError, FilePlace, InputQuantity, read_columns, read_frame, read_grey_levels};
@@ -17,7 +17,7 @@ use tactile_imaging::pipeline::{
     PipelineError, Press, SurfaceInput,
 };
 
-/// A scene's calibration, read.
+/// The calibration of a scene, read from its files.
 ///
 /// ```
 /// use tactile_imaging::force::CalibrationPair;
@@ -35,17 +35,17 @@ use tactile_imaging::pipeline::{
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum LoadedCalibration {
-    /// Integrated pixel value and force.
+    /// Pairs of integrated pixel value and force.
     Pairs(Vec<CalibrationPair>),
-    /// Darkness in grey levels and depth in metres.
+    /// Pairs of darkness in grey levels and depth in metres.
     DepthTable(Vec<(f64, f64)>),
-    /// None: the forces are a gauge's.
+    /// No calibration, because a gauge read the forces.
     Gauge,
-    /// A sensor with its curve, lens and layers.
+    /// A calibrated sensor with its curve, lens and layers.
     Sensor(Box<Sensor>),
 }
 
-/// A scene's images and calibration.
+/// The images and the calibration of a scene.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -66,24 +66,24 @@ pub enum LoadedCalibration {
 pub struct SceneData {
     /// The frame without contact.
     pub reference: Array2<u8>,
-    /// The frames, in the order of the scene. Those that are missing are read from their files
+    /// The frames, in the order of the scene. Frames missing here are read from their files
     /// whenever a stage needs them.
     pub frames: Vec<Array2<u8>>,
     /// The calibration.
     pub calibration: LoadedCalibration,
-    /// The table of contacts, where the scene names one.
+    /// The contact table, if the scene names one.
     pub contact_table: Option<ContactTable>,
     /// The images of the presses of known force, in the order of the scene.
     pub checks: Vec<Array2<u8>>,
 }
 
 impl Scene {
-    /// Reads the images and the calibration, and checks that the images have one size. Where the
-    /// frames are too many for the memory, [`measure_file`](Self::measure_file) keeps a few of
-    /// them.
+    /// Reads the images and the calibration, and checks that all images have one size. If the
+    /// frames do not fit into memory, use [`measure_file`](Self::measure_file), which keeps only a
+    /// few of them.
     ///
     /// # Errors
-    /// [`FileError`], naming the field and the file.
+    /// [`FileError`], which names the field and the file.
     pub fn load(&self) -> Result<SceneData, FileError> {
         let mut data = self.load_without_frames()?;
         let reference = data.reference.view();
@@ -92,11 +92,12 @@ impl Scene {
         Ok(data)
     }
 
-    /// As [`load`](Self::load) without the frames. A [`press`](Self::press) then reads each when it
-    /// is added and again when a stage needs it, so that any number of them fits into memory.
+    /// Does the same as [`load`](Self::load) without the frames. A [`press`](Self::press) then
+    /// reads each frame when it is added and again when a stage needs it, so that memory does not
+    /// limit their number.
     ///
     /// # Errors
-    /// [`FileError`], naming the field and the file.
+    /// [`FileError`], which names the field and the file.
     pub fn load_without_frames(&self) -> Result<SceneData, FileError> {
         let in_field = |field: &str, error: Box<dyn Error + Send + Sync>| {
             FileError::field(&self.file, field, error)
@@ -127,7 +128,7 @@ impl Scene {
             read_frame(&self.file, &field, &check.image, self.bits, size)
         });
         let checks = checks.collect::<Result<_, _>>()?;
-        // Errors of a table or a sensor name fields of their own file.
+        // Errors of a contact table or a sensor file name fields of that file.
         let contact_table = self.contact_table.as_ref().map(read_contact_table);
         Ok(SceneData {
             reference,
@@ -138,7 +139,7 @@ impl Scene {
         })
     }
 
-    /// The image of a frame, of the reference's size.
+    /// The image of a frame, which must have the size of the reference.
     fn read_frame(
         &self,
         index: usize,
@@ -149,10 +150,10 @@ impl Scene {
         read_frame(&self.file, &field, path, self.bits, size)
     }
 
-    /// Reads a scene file with its images and measures everything.
+    /// Reads a scene file with its images and runs all stages.
     ///
-    /// The error of a stage stands in its place in the [`Measurement`], and
-    /// [`measure_error`](Self::measure_error) adds the field of the scene file to it.
+    /// If a stage fails, its error takes the place of its result in the [`Measurement`].
+    /// [`measure_error`](Self::measure_error) adds the field of the scene file to the error.
     ///
     /// ```
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -187,7 +188,7 @@ impl Scene {
         Ok(press.measure())
     }
 
-    /// The pipeline for this scene's sensor and object, of the stages it names.
+    /// The pipeline for the sensor and the object of this scene, with the stages that it names.
     ///
     /// ```
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -209,7 +210,7 @@ impl Scene {
     /// let frames = vec![frame.clone()];
     /// let (contact_table, checks) = (None, vec![]);
     /// let data = SceneData { reference: frame, frames, calibration, contact_table, checks };
-    /// // The file has strain = "hencky", and the program its own number of points.
+    /// // The strain measure comes from the file, the number of points from the program.
     /// let pipeline = scene.pipeline(&data)?.with_control_points(60);
     /// let mut press = scene.press(&pipeline, &data)?;
     /// assert!(press.contact(0)?.is_none(), "as grey as the reference");
@@ -217,13 +218,13 @@ impl Scene {
     /// ```
     ///
     /// # Errors
-    /// [`FileError::Rejected`] where the calibration or the waveguide is not usable.
+    /// [`FileError::Rejected`] if the calibration or the waveguide cannot be used.
     pub fn pipeline(&self, data: &SceneData) -> Result<Pipeline, FileError> {
         let pipeline = self.build(data).map_err(|e| self.measure_error(e))?;
         self.checked(pipeline, data)
     }
 
-    /// The pipeline with what the presses of known force show.
+    /// The pipeline, corrected by the presses of known force.
     fn checked(&self, pipeline: Pipeline, data: &SceneData) -> Result<Pipeline, FileError> {
         if self.checks.is_empty() {
             return Ok(pipeline);
@@ -240,11 +241,11 @@ impl Scene {
         })
     }
 
-    /// The scene's frames on a pipeline, ready to be measured. Those that `data` lacks are read
-    /// from their files.
+    /// Adds the frames of the scene to a pipeline, ready to be measured. Frames that `data` lacks
+    /// are read from their files.
     ///
     /// # Errors
-    /// [`FileError::Rejected`], also of frames that are read.
+    /// [`FileError::Rejected`], also if a frame cannot be read.
     pub fn press<'a>(
         &self,
         pipeline: &Pipeline,
@@ -320,7 +321,7 @@ impl Scene {
             settings.flat_field = self.flat_field;
         })?;
         let guide = guide(&self.layers).map_err(PipelineError::Material)?;
-        // An estimator named in the file goes before the one that the contact table suggests.
+        // An estimator named in the file takes precedence over the one of the contact table.
         let pipeline = match (&data.contact_table, self.stages.estimator) {
             (Some(table), EstimatorChoice::Best | EstimatorChoice::TabulatedContact) => {
                 let Object::Sphere {
@@ -348,9 +349,9 @@ impl Scene {
         })
     }
 
-    /// The pipeline's error with the field that it comes from.
+    /// The error of a pipeline, with the field of the scene that caused it.
     pub fn measure_error(&self, error: PipelineError) -> FileError {
-        // The field that a user has to change, as far as the kind of error determines it.
+        // The field that the user has to change, if the kind of error determines it.
         let field = match (&error, error.frame()) {
             (PipelineError::NoForce { .. }, Some(i)) => format!("frames[{}].force_N", i + 1),
             (PipelineError::Time { .. } | PipelineError::TimeDecreases { .. }, Some(i)) => {
@@ -374,7 +375,7 @@ impl Scene {
     }
 }
 
-/// Pairs of integrated pixel value and force from a CSV file.
+/// Reads pairs of integrated pixel value and force from a CSV file.
 pub(super) fn force_pairs(path: &Path) -> Result<Vec<CalibrationPair>, FileError> {
     let value = (&["integrated_pixel_value"][..], "grey_levels");
     let [values, forces] = read_columns(path, [value, (&["force"], "N")])?;
@@ -390,8 +391,8 @@ pub(super) fn force_pairs(path: &Path) -> Result<Vec<CalibrationPair>, FileError
     }
 }
 
-/// Why rows of (darkness in grey levels, depth in metres) are no depth table: a darkness that eight
-/// bits do not hold, or depths of no gel. `None` where they may be one.
+/// The reason why rows of (darkness in grey levels, depth in metres) cannot be a depth table: a
+/// darkness above eight bits, or a depth beyond any gel. `None` if they can be one.
 ///
 /// ```
 /// use tactile_files::scene::doubt_of_depths;
@@ -406,7 +407,7 @@ pub fn doubt_of_depths(rows: &[(f64, f64)]) -> Option<String> {
              columns swapped?"
         ));
     }
-    // Dark sensors are films of some millimetres.
+    // The films of such sensors are a few millimetres thick.
     let (_, depth) = rows.iter().find(|(_, depth)| *depth > 20e-3)?;
     Some(format!(
         "a depth of {} mm is more than any film is thick: are the columns swapped, or is the unit \
@@ -415,8 +416,8 @@ pub fn doubt_of_depths(rows: &[(f64, f64)]) -> Option<String> {
     ))
 }
 
-/// Why pairs are no calibration of light against force: forces that no sensor bears, that do not
-/// change, or that fall where the light grows. `None` where they may be one.
+/// The reason why pairs cannot calibrate light against force: forces that no sensor bears, forces
+/// that are all equal, or forces that fall while the light grows. `None` if they can.
 ///
 /// ```
 /// use tactile_imaging::force::CalibrationPair;
@@ -448,7 +449,7 @@ pub fn doubt_of_pairs(pairs: &[CalibrationPair]) -> Option<String> {
         ));
     }
     (together < 0.0).then(|| {
-        "the force falls where the light grows: is a column that of another quantity, or are rows \
+        "the force falls while the light grows: does a column hold another quantity, or are rows \
          out of order?"
             .to_owned()
     })

@@ -1,4 +1,4 @@
-//! What a scene file may hold, and contact tables as files.
+//! The fields of a scene file, and the files of contact tables.
 use crate::io::{
     FileError, beside, force, length, modulus, not_negative, number, one_or_more, parse_toml,
     pixel_size, poisson_ratio, positive, read_bytes, read_toml,
@@ -48,13 +48,13 @@ use tactile_imaging::pipeline::{
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum CalibrationSource {
-    /// Pairs of integrated pixel value and force.
+    /// The path of pairs of integrated pixel value and force.
     Pairs(PathBuf),
-    /// A table of darkness and depth.
+    /// The path of a table of darkness and depth.
     DepthTable(PathBuf),
-    /// None: every frame has a gauge's reading of its force.
+    /// No calibration: every frame has a gauge reading of its force.
     Gauge,
-    /// The path of a sensor file: curve, lens and layers.
+    /// The path of a sensor file, which has curve, lens and layers.
     Sensor(PathBuf),
 }
 
@@ -82,21 +82,21 @@ pub enum CalibrationSource {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneFrame {
-    /// The image.
+    /// The path of the image.
     pub image: PathBuf,
-    /// The reading of a gauge in newtons, if there was one.
+    /// The gauge reading in newtons, if there is one.
     #[serde(default, rename = "force_N", deserialize_with = "force")]
     pub force_n: Option<f64>,
-    /// The standard error of that reading in newtons, if one is stated.
+    /// The standard error of the gauge reading in newtons, if one is stated.
     #[serde(default, rename = "force_error_N", deserialize_with = "not_negative")]
     pub force_error_n: Option<f64>,
-    /// When it was taken, in seconds since the object touched, if that is known.
+    /// The time of the frame in seconds since first contact, if known.
     #[serde(default, deserialize_with = "not_negative")]
     pub time_s: Option<f64>,
 }
 
 impl SceneFrame {
-    /// An image of which nothing else is known.
+    /// A frame of which only the image is known.
     pub fn new(image: impl Into<PathBuf>) -> Self {
         Self {
             image: image.into(),
@@ -131,13 +131,13 @@ impl SceneFrame {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneCheck {
-    /// The image.
+    /// The path of the image.
     pub image: PathBuf,
-    /// The force of the weight or of a gauge in newtons. 0.2 % of it are its error where none is
-    /// stated.
+    /// The force of a weight or a gauge in newtons. If no error is stated, it is 0.2 % of the
+    /// force.
     pub known_n: Estimate,
-    /// What was pressed. Of a ball 0.5 % of the radius, 2 % of the modulus and 0.01 of Poisson's
-    /// ratio are the errors where none are stated.
+    /// The pressed object. If no errors of a ball are stated, they are 0.5 % of the radius, 2 % of
+    /// the modulus and 0.01 in Poisson's ratio.
     pub object: CheckedObject,
 }
 
@@ -153,7 +153,7 @@ struct CheckTable {
     ball: Option<BallTable>,
 }
 
-/// Objects whose light is checked.
+/// Objects that check the light.
 #[derive(Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum OpticalCheck {
@@ -168,7 +168,7 @@ struct BallTable {
     radius_m: f64,
     #[serde(default, deserialize_with = "stated")]
     radius_error_m: Option<f64>,
-    /// Without it the ball is rigid.
+    /// If absent, the ball is rigid.
     #[serde(default, deserialize_with = "modulus")]
     youngs_modulus_pa: Option<f64>,
     #[serde(default, deserialize_with = "stated")]
@@ -196,7 +196,8 @@ impl BallTable {
 }
 
 impl CheckTable {
-    /// The check, its image beside `file`, or the field that is missing or too many.
+    /// The check with its image path resolved beside `file`, or the field that is missing or
+    /// superfluous.
     fn check(self, file: &Path) -> Result<SceneCheck, (&'static str, &'static str)> {
         let object = match (self.object, self.ball) {
             (Some(OpticalCheck::Sample), None) => CheckedObject::Sample,
@@ -257,7 +258,7 @@ pub struct SceneLayer {
     /// Young's modulus in pascals.
     #[serde(deserialize_with = "modulus")]
     pub youngs_modulus_pa: f64,
-    /// Poisson's ratio, ½ where a file states none.
+    /// Poisson's ratio, ½ if the file states none.
     #[serde(default = "incompressible", deserialize_with = "poisson_ratio")]
     pub poisson_ratio: f64,
 }
@@ -274,7 +275,7 @@ pub(crate) fn refractive_index<'de, D: Deserializer<'de>>(
     number(deserializer, "a number of at least 1", accepts)
 }
 
-/// Layers as contact laws take them.
+/// Converts layers to the type of the contact laws.
 pub(crate) fn elastic_layers(layers: &[SceneLayer]) -> Vec<Layer> {
     let elastic = |layer: &SceneLayer| Layer {
         thickness_m: layer.thickness_m,
@@ -300,7 +301,7 @@ fn stated<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::
     }
 }
 
-/// A scene file, checked. Paths are resolved, the files they name not yet read.
+/// A checked scene file. Its paths are resolved, but the files that they name are not read yet.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -317,7 +318,7 @@ fn stated<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::
 /// let scene = Scene::read(&path)?; // a CL2000X ball, E = 103 kPa, at 0.7 N and 1.2 N
 /// let data = scene.load()?;
 /// let mut press = scene.press(&scene.pipeline(&data)?, &data)?;
-/// // The errors of a scene name file and field.
+/// // Errors of a scene name its file and the field.
 /// let modulus = press.modulus().map_err(|e| scene.measure_error(e))?;
 /// let (low, high) = (modulus.interval_95.lower, modulus.interval_95.upper);
 /// assert!(low < 103e3 && high.is_none_or(|high| high > 103e3));
@@ -325,21 +326,22 @@ fn stated<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
-    /// The file itself.
+    /// The path of the scene file.
     pub file: PathBuf,
-    /// The image without contact.
+    /// The path of the image without contact.
     pub reference: PathBuf,
-    /// Size of a pixel on the sensing surface in metres, x and y. Zero where a sensor file has it.
+    /// Size of a pixel on the sensing surface in metres, along x and y. Zero if a sensor file holds
+    /// it.
     pub pixel_size_m: [f64; 2],
-    /// Whether vignetting is corrected by the reference's own brightness.
+    /// Whether vignetting is corrected by the brightness of the reference.
     pub flat_field: bool,
-    /// Bits of the camera, for images of 16 bits whose files do not state them.
+    /// Bits of the camera, for 16-bit images whose files do not state them.
     pub bits: Option<u8>,
-    /// Whether changes of the lamps since the reference are divided out where they are detected.
+    /// Whether detected changes of the lamps since the reference are divided out.
     pub corrects_drift: bool,
-    /// Standard errors of what the frames are measured with.
+    /// Standard errors of the inputs.
     pub errors: Assumptions,
-    /// How grey levels become force or depth.
+    /// The conversion from grey levels to force or depth.
     pub calibration: CalibrationSource,
     /// The frames, in the order of the file.
     pub frames: Vec<SceneFrame>,
@@ -349,10 +351,10 @@ pub struct Scene {
     pub object: Object,
     /// The waveguide's layers from the object's side, rigid if empty.
     pub layers: Vec<SceneLayer>,
-    /// A table of the ball's contacts with the waveguide. The modulus follows from it unless
-    /// `stages` names another estimator.
+    /// The path of a contact table of the ball on the waveguide. The modulus is estimated from it
+    /// unless `stages` names another estimator.
     pub contact_table: Option<PathBuf>,
-    /// The stages, by name.
+    /// The names of the stages.
     pub stages: StagesConfig,
 }
 
@@ -393,7 +395,7 @@ impl Scene {
     }
 }
 
-/// A scene file as it stands.
+/// The fields of a scene file, unchecked.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SceneFile {
@@ -500,7 +502,7 @@ impl<'de> Deserialize<'de> for WaveguideTable {
             #[serde(deserialize_with = "one_or_more")]
             layers: Vec<SceneLayer>,
         }
-        // An untagged enum would lose the path to a wrong field of a layer.
+        // An untagged enum would lose the path to a wrong field in a layer.
         struct RigidOrLayers;
         impl<'de> Visitor<'de> for RigidOrLayers {
             type Value = WaveguideTable;
@@ -525,7 +527,7 @@ impl<'de> Deserialize<'de> for WaveguideTable {
     }
 }
 
-/// Stages by name, absent where the default is meant.
+/// Names of stages. An absent stage takes its default.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StagesTable {
@@ -540,17 +542,17 @@ struct StagesTable {
 }
 
 impl SceneFile {
-    /// Not generic, so that the parser is compiled once, not again in every crate that reads.
+    /// The function is not generic, so that the parser is compiled only once.
     fn parse(text: &str, path: &Path) -> Result<Scene, FileError> {
         parse_toml::<Self>(text, path)?.validate(path)
     }
 
-    /// Checks the fields against one another.
+    /// Checks the fields against each other.
     fn validate(self, file: &Path) -> Result<Scene, FileError> {
         let error = |field: &str, reason: &str| FileError::field(file, field, reason);
         let missing = |field: &str| error(field, "it is missing");
         let calibration = self.calibration(file)?;
-        // Relaxation is fitted over times in order.
+        // The relaxation fit needs times in ascending order.
         let mut last_s = 0.0;
         for (index, frame) in self.frames.iter().enumerate() {
             let Some(time_s) = frame.time_s else { continue };
@@ -571,13 +573,13 @@ impl SceneFile {
             return Err(error("check", reason));
         }
         let stages = self.stages.choices();
-        // A stage that is named but would not run is a misunderstanding of the file.
+        // A named stage that would not run is refused as a mistake of the user.
         let by_table = matches!(calibration, CalibrationSource::DepthTable(_));
         if by_table && self.stages.reconstruction.is_some() {
             let reason = "expected none: the depth table makes the surface";
             return Err(error("stages.reconstruction", reason));
         }
-        // The sensor file has the pixel size, and its curve allows for the drift of the lamps.
+        // The sensor file holds the pixel size, and its curve allows for drift of the lamps.
         let has_sensor = self.sensor.is_some();
         let pixel_size_m = match self.pixel_size_m {
             Some(size) => size,
@@ -597,7 +599,8 @@ impl SceneFile {
         }
         let of_ball = |check: &SceneCheck| matches!(check.object, CheckedObject::Ball(_));
         if self.contact_table.is_some() && checks.iter().any(of_ball) {
-            let reason = "expected none beside checks by balls: it is of the layers as stated";
+            let reason = "expected none beside checks by balls: the table was computed for the \
+            stated layers";
             return Err(error("contact_table", reason));
         }
         let object = self.object.object(file)?;
@@ -641,11 +644,11 @@ impl SceneFile {
         })
     }
 
-    /// The one source of the calibration.
+    /// The source of the calibration, which must be unique.
     fn calibration(&self, file: &Path) -> Result<CalibrationSource, FileError> {
         let error = |field: &str, reason: &str| FileError::field(file, field, reason);
         if let Some(sensor) = &self.sensor {
-            // Two sources of one quantity would leave open which of them counts.
+            // With two sources of one quantity it would be unclear which one is used.
             let beside_sensor = [
                 ("pixel_size_m", self.pixel_size_m.is_some()),
                 ("flat_field", self.flat_field.is_some()),
@@ -715,7 +718,7 @@ impl ObjectTable {
 }
 
 impl StagesTable {
-    /// The stages named, the others as printed in the paper or the defaults.
+    /// The named stages. The others are the defaults, or those of the paper.
     fn choices(&self) -> StagesConfig {
         let others = if self.as_printed {
             StagesConfig::as_printed()
@@ -754,9 +757,9 @@ impl StagesTable {
 /// ```
 ///
 /// # Errors
-/// [`FileError`], also for contacts that make no table, or a table of another version.
+/// [`FileError`], also if the contacts do not form a table or the table has another version.
 pub fn read_contact_table(path: impl AsRef<Path>) -> Result<ContactTable, FileError> {
-    // Not generic, so that the parser is compiled once, not again in every crate that reads.
+    // The function is not generic, so that the parser is compiled only once.
     fn read(path: &Path) -> Result<ContactTable, FileError> {
         read_toml(path)
     }
@@ -765,11 +768,11 @@ pub fn read_contact_table(path: impl AsRef<Path>) -> Result<ContactTable, FileEr
 
 /// Computes the contact table of the ball and the waveguide that a file describes.
 ///
-/// The file is a scene file, or one with its tables `object` and `waveguide` alone. `progress` is
+/// The file is a scene file, or holds only its tables `object` and `waveguide`. `progress` is
 /// called before each modulus and after the last.
 ///
 /// # Errors
-/// [`FileError`], also where the object is no ball, or the table cannot be computed.
+/// [`FileError`], also if the object is not a ball or the table cannot be computed.
 #[cfg(feature = "fem")]
 pub fn solve_contact_table(
     path: impl AsRef<Path>,
@@ -784,8 +787,8 @@ pub fn solve_contact_table(
     }
     let path = path.as_ref();
     let text = String::from_utf8_lossy(&read_bytes(path)?).into_owned();
-    // A scene has a reference. The other kind of file has the two tables alone, so that a misspelt
-    // `waveguide` is an error and not a rigid guide.
+    // A scene has a reference. The other kind of file may hold only the two tables, so that a
+    // misspelt `waveguide` is an error instead of a rigid guide.
     let is_scene = parse_toml::<toml::Table>(&text, path)?.contains_key("reference");
     let BallFile { object, waveguide } = if is_scene {
         let SceneFile {
@@ -817,7 +820,7 @@ pub fn solve_contact_table(
         .map_err(|error| FileError::field(path, "waveguide", error))
 }
 
-/// The layers of a scene as a waveguide, rigid without any.
+/// The layers of a scene as a waveguide, which is rigid without layers.
 pub(crate) fn guide(layers: &[SceneLayer]) -> Result<Waveguide, ElasticityError> {
     if layers.is_empty() {
         return Ok(Waveguide::rigid());

@@ -17,14 +17,14 @@ use tactile_imaging::inclusion::{
     ScanPress, TissueBlock, asymmetry_warnings, ring_means,
 };
 
-/// Error of a press's place in metres if the file states none: of a hand that places the guide on
-/// lines drawn on the block, or of a simple robot.
+/// Position error of a press in metres if the file states none. It is typical of placing the guide
+/// by hand on lines drawn on the block, or by a simple robot.
 const USUAL_POSITION_ERROR_M: f64 = 0.2e-3;
 
 /// A block of tissue, the guide pressed onto it, and the frames.
 ///
-/// Of a scan, `[[presses]]` with `position_m` and `frames` each stand in place of the frames, and
-/// `position_error_m` is the standard error of their places (0.2 mm where it is absent).
+/// A scan has `[[presses]]` instead of frames, each with `position_m` and `frames`.
+/// `position_error_m` is the standard error of the positions (0.2 mm if absent).
 ///
 /// ```
 /// use tactile_files::scene::InclusionScene;
@@ -58,7 +58,7 @@ const USUAL_POSITION_ERROR_M: f64 = 0.2e-3;
 /// ```
 #[derive(Clone, Debug)]
 pub struct InclusionScene {
-    /// The block, with the errors of its sizes.
+    /// The block, with the errors of its dimensions.
     pub specimen: TissueBlock,
     /// The guide.
     pub guide: Guide,
@@ -70,7 +70,7 @@ pub struct InclusionScene {
     position_error_m: f64,
 }
 
-/// The frames of a press, and where it was.
+/// The frames of a press, and its position.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Press {
@@ -89,7 +89,7 @@ struct Frame {
     force_n: Option<f64>,
 }
 
-/// The pressures of a scene's images.
+/// The pressures in the images of a scene.
 ///
 /// ```no_run
 /// use tactile_files::scene::{InclusionScene, LoadedInclusion};
@@ -101,36 +101,36 @@ struct Frame {
 pub struct LoadedInclusion {
     /// Ring means of each frame, one press after the other.
     pub rings: Vec<RingMeans>,
-    /// Those of the first press as the search takes them, at the radii of its first frame.
+    /// Pressure profiles of the first press, at the radii of its first frame, for the search.
     pub profiles: Vec<PressureProfile>,
-    /// The whole face at each press, on square cells within three quarters of its radius, which
-    /// shows a lump off the axis.
+    /// The whole face at each press, on square cells within three quarters of its radius. It shows
+    /// an inclusion off the axis.
     pub scan: Scan,
 }
 
 impl LoadedInclusion {
-    /// First harmonic of the pressure around the axis over its mean, of the least symmetric frame.
+    /// First harmonic of the pressure around the axis over its mean, in the least symmetric frame.
     pub fn asymmetry(&self) -> f64 {
         self.rings.iter().map(|r| r.asymmetry).fold(0.0, f64::max)
     }
 
-    /// Root mean square of the second to fourth harmonics of that frame which has most of them.
+    /// Root mean square of the second to fourth harmonics, in the frame with the largest value.
     pub fn harmonics(&self) -> f64 {
         self.rings.iter().map(|r| r.harmonics).fold(0.0, f64::max)
     }
 
-    /// Whether the lump is looked for under the axis, from the ring means: where there is one press
-    /// and its pressure is symmetric.
+    /// Whether the search uses the ring means and assumes an inclusion under the axis. This holds
+    /// for a single press with symmetric pressure.
     pub fn is_axial(&self) -> bool {
         self.scan.presses.len() == 1
             && asymmetry_warnings(self.asymmetry(), self.harmonics()).is_empty()
     }
 
-    /// The lump that explains the frames best: one under the axis where the pressure of one press
-    /// is symmetric, else one anywhere from the whole face of all presses.
+    /// Searches the inclusion that fits the frames best. If [`is_axial`](Self::is_axial), it lies
+    /// under the axis. Otherwise its position is fitted to the whole face of all presses.
     ///
     /// # Errors
-    /// Those of [`InclusionSearch::search_with_progress`].
+    /// The errors of [`InclusionSearch::search_with_progress`].
     pub fn search(
         &self,
         search: &InclusionSearch,
@@ -180,8 +180,8 @@ impl InclusionScene {
             }
             let mut last_m = 0.0;
             for (frame_index, frame) in press.frames.iter_mut().enumerate() {
-                // Contact grows with the approach, and the search starts each frame from the one
-                // before.
+                // The contact grows with the approach, and the search starts each frame from the
+                // previous one.
                 if frame.approach_m <= last_m {
                     let field = field(&format!("frames[{}].approach_m", frame_index + 1));
                     let reason = "expected an approach greater than that of the frame before";
@@ -214,20 +214,20 @@ impl InclusionScene {
         })
     }
 
-    /// The images, in the order of the file.
+    /// The paths of the images, in the order of the file.
     pub fn images(&self) -> Vec<&Path> {
         let frames = self.presses.iter().flat_map(|press| &press.frames);
         frames.map(|frame| frame.image.as_path()).collect()
     }
 
-    /// Reads the images and takes their ring means.
+    /// Reads the images and computes their ring means.
     ///
-    /// The scale from light to pressure is the calibration's slope: p = s I / A with s in newtons
-    /// per grey level and the area A of a pixel. Without a calibration the force spread over the
-    /// picture gives it, and is then not counted once more as a measurement.
+    /// The scale from light to pressure is the slope of the calibration: p = s I / A, with s in
+    /// newtons per grey level and the area A of a pixel. Without a calibration the force of each
+    /// frame gives the scale, and is then not used again as a measurement.
     ///
     /// # Errors
-    /// [`FileError`] for images that cannot be read, differ in size or show no face.
+    /// [`FileError`] if images cannot be read, differ in size or show no face.
     pub fn load(&self) -> Result<LoadedInclusion, FileError> {
         let reference = self.image("reference", &self.reference, None)?;
         let newtons_per_grey = self.newtons_per_grey()?;
@@ -264,12 +264,12 @@ impl InclusionScene {
             scan.presses
                 .push(self.face(press, &rings[first..], &images));
         }
-        // The search compares frames ring by ring, so all are taken at the radii of the first.
+        // The search compares frames ring by ring, so that all use the radii of the first.
         let first = rings.first().map(|first| first.radii_m.clone());
         let radii = first.unwrap_or_default();
         let profiles = self.presses[0].frames.iter().zip(&rings);
         let profiles = profiles.map(|(frame, means)| {
-            // A force that gave the scale is no measurement of its own.
+            // A force that gave the scale is not an independent measurement.
             let force_n = frame.force_n.filter(|_| newtons_per_grey.is_some());
             means.profile(&radii, frame.approach_m, force_n)
         });
@@ -280,12 +280,14 @@ impl InclusionScene {
         })
     }
 
-    /// The pressures of a press's frames on cells of the face.
+    /// The pressures of the frames of a press on cells of the face.
     fn face(&self, press: &Press, rings: &[RingMeans], images: &[Array2<f64>]) -> ScanPress {
-        // Cells in a radius. Those of one press are half as wide as the narrowest lump that shows,
-        // and a search's time grows as the third power of the number of all cells.
+        // Number of cells per radius. For a single press, cells are half as wide as the narrowest
+        // inclusion that can be seen. The search time grows as the third power of the total number
+        // of cells.
         let fineness = if self.presses.len() == 1 { 15.0 } else { 8.0 };
-        // The face does not move in the picture: the mean of its centres is nearest to it.
+        // The face does not move in the picture, so that the mean of the centres is the best
+        // estimate.
         let mean = |axis: usize| {
             let centres = rings.iter().map(|rings| rings.centre_px[axis]);
             centres.sum::<f64>() / rings.len() as f64
@@ -333,7 +335,7 @@ impl InclusionScene {
     }
 }
 
-/// Name of a field of a press, by its number from zero in a file with several.
+/// Name of a field of a press. `press` is its index from zero, or `None` in a file without presses.
 fn press_field(press: Option<usize>, name: &str) -> String {
     match press {
         Some(index) => format!("presses[{}].{name}", index + 1),
@@ -341,7 +343,7 @@ fn press_field(press: Option<usize>, name: &str) -> String {
     }
 }
 
-/// An inclusion scene as it stands in its file.
+/// The fields of an inclusion scene, unchecked.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct InclusionFile {
@@ -402,7 +404,7 @@ enum InterfaceName {
     Frictionless,
 }
 
-/// A Poisson ratio that finite elements take.
+/// A Poisson ratio that the finite elements can use.
 fn compressible<'de, D: Deserializer<'de>, T: From<f64>>(d: D) -> Result<T, D::Error> {
     let expected = "a number above -1, at most 0.4999";
     number(d, expected, |v| v > -1.0 && v <= 0.4999)
@@ -423,7 +425,7 @@ impl BlockTable {
                 specimen.with_poisson_ratio(ratio, self.poisson_ratio_error.unwrap_or(0.005))?;
         }
         if let Some(modulus) = self.youngs_modulus_pa {
-            // A modulus from a textbook or another laboratory is good to a tenth.
+            // A modulus from the literature or another laboratory is accurate to some 10 %.
             let error = self.youngs_modulus_error_pa.unwrap_or(0.1 * modulus);
             specimen = specimen.with_youngs_modulus(modulus, error)?;
         }
@@ -447,7 +449,7 @@ struct GuideTable {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct LayerTable {
-    /// It plays no part, but stands in files of the same sensor.
+    /// Not used here, but present in files of the same sensor.
     #[serde(rename = "refractive_index")]
     _refractive_index: Option<f64>,
     #[serde(deserialize_with = "length")]

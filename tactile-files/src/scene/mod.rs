@@ -1,4 +1,4 @@
-//! Scene files: a user's own frames, and all that is needed to measure them, in one TOML file.
+//! Scene files: one TOML file that names the frames and all inputs of a measurement.
 //!
 //! ```toml
 //! reference = "reference.png"            # the sensor without contact
@@ -32,8 +32,8 @@
 //! poisson_ratio = 0.5                    # incompressible where it is absent
 //! ```
 //!
-//! A calibrated [`Sensor`](crate::sensor::Sensor) stands for `pixel_size_m`, `[calibration]`,
-//! `flat_field` and `[waveguide]`, with the errors of them all:
+//! A calibrated [`Sensor`](crate::sensor::Sensor) replaces `pixel_size_m`, `[calibration]`,
+//! `flat_field` and `[waveguide]`, and adds their errors:
 //!
 //! ```toml
 //! reference = "reference.png"
@@ -46,8 +46,8 @@
 //! poisson_ratio_error = 0.002
 //! ```
 //!
-//! More may stand there (`flat_field`, `illumination_drift`, `bits` and `contact_table` above the
-//! first table):
+//! Further fields are possible (`flat_field`, `illumination_drift`, `bits` and `contact_table`
+//! stand above the first table):
 //!
 //! ```toml
 //! contact_table = "table.toml"           # of this ball and waveguide, made by `tactile table`
@@ -65,9 +65,9 @@
 //! estimator = "best"                     # EstimatorChoice
 //! ```
 //!
-//! Presses of known force show the sensor as it is on the day. Of the sample or the calibrator they
-//! show the gain: forces are divided by it, and its error stands in place of `coupling_error`. Of a
-//! ball of known modulus they show the layers of the guide, by its contact radius:
+//! Presses of known force show the present state of the sensor. A press of the sample or the
+//! calibrator measures the gain: forces are divided by it, and its error replaces `coupling_error`.
+//! A press of a ball of known modulus corrects the layers of the guide by its contact radius:
 //!
 //! ```toml
 //! [[check]]
@@ -88,7 +88,7 @@
 //! poisson_ratio_error = 0.002            # 0.01 if absent
 //! ```
 //!
-//! Inputs have standard errors. What is not stated is assumed, and the result names it:
+//! Inputs have standard errors. Errors that are not stated are assumed, and the result names them:
 //!
 //! ```toml
 //! pixel_size_error = 1e-3                # relative, 0.3 % if absent
@@ -102,8 +102,8 @@
 //! adhesion_error_j_per_m2 = 0.0005       # of a ball, 0.001 if absent
 //! ```
 //!
-//! The names of a stage are those of its choice in [`StagesConfig`](tactile_imaging::pipeline::StagesConfig).
-//! Images are PNG, PGM, JPEG or TIFF. Colour becomes grey by the luma of Rec. 601, see
+//! The names of stages are those in [`StagesConfig`](tactile_imaging::pipeline::StagesConfig).
+//! Images are PNG, PGM, JPEG or TIFF. Colour is converted to grey by the luma of Rec. 601, see
 //! [`read_grey_image`](crate::io::read_grey_image). Relative paths are relative to the scene file.
 //! Fields counted in errors (`frames[2]`) start at 1.
 mod data;

@@ -12,7 +12,7 @@ use tactile_imaging::force::{
 };
 use tactile_imaging::pipeline::ReferenceLight;
 
-/// A calibrated sensor and how it was found. Made by
+/// A calibrated sensor with the findings of its calibration, from
 /// [`SensorCalibration::run`](super::SensorCalibration::run).
 ///
 /// ```no_run
@@ -26,19 +26,19 @@ use tactile_imaging::pipeline::ReferenceLight;
 pub struct CalibratedSensor {
     /// The sensor.
     pub sensor: Sensor,
-    /// The lens as the target showed it. `None` without a target.
+    /// The lens as fitted to the target. `None` without a target.
     pub lens: Option<LensFit>,
-    /// Every press.
+    /// The findings for every press.
     pub presses: Vec<PressFinding>,
-    /// Every parameter of the layers.
+    /// The findings for every parameter of the layers.
     pub layers: Vec<LayerFinding>,
 }
 
-/// Relative error of a force beside the gauge's noise: the noise of the frames, and the smoothing
+/// Relative error of a force beyond the gauge noise, from the noise of the frames and the smoothing
 /// of the curve.
 const CURVE_ERROR: f64 = 2e-3;
 
-/// The fewest presses that determine a curve.
+/// Smallest number of presses that determine a curve.
 const FEWEST_PRESSES: usize = 5;
 
 /// A press that shows a contact.
@@ -53,8 +53,8 @@ impl SensorCalibration {
     /// # Errors
     /// [`SensorError`]: one sentence. A press is named by its number.
     pub fn run(&self) -> Result<CalibratedSensor, SensorError> {
-        // Each stage needs the one before: contacts need the lens, the curve needs their
-        // histograms, and radii and forces of the presses need the curve.
+        // Each stage needs the previous one. Contacts need the lens, the curve needs the histograms
+        // of contacts, and radii and forces of the presses need the curve.
         let reference = self.reference()?;
         let (geometry, lens) = self.geometry()?;
         let seen = self.contacts(&reference, &geometry.lens)?;
@@ -92,11 +92,11 @@ impl SensorCalibration {
         reference.with_flat_field().map_err(SensorError::Reference)
     }
 
-    /// From the target, or as stated.
+    /// The geometry from the target, or as stated.
     fn geometry(&self) -> Result<(SensorGeometry, Option<LensFit>), SensorError> {
         let shape = self.references.first().map_or((0, 0), Array2::dim);
         let frame_px = [shape.1, shape.0];
-        // Without a target the lens is taken as free of distortion, with an exact k₁ and k₂.
+        // Without a target the lens is assumed free of distortion, with exact k₁ and k₂.
         let Some((frame, pitch_m, target_error)) = &self.target else {
             let (size, error) = self.pixel_size_m;
             let mut covariance = [[0.0; 4]; 4];
@@ -137,12 +137,12 @@ impl SensorCalibration {
             let found: Detection = detector
                 .detect_with(&mut workspace, given.frame.view(), reference)
                 .map_err(failed)?;
-            // A press too light to be seen has a row in the findings, but no part in the curve.
+            // A press too light to be seen has a row in the findings but is not used for the curve.
             let Some(contact) = found.contact else {
                 continue;
             };
             let centre = contact.centroid_px.map(|c| c.value);
-            // Distortion changes the area of a pixel from the middle to the edge.
+            // Distortion changes the area of a pixel from the centre to the edge.
             let area = lens.mean_pixel_area_m2(centre, contact.equivalent_radius_px);
             let Some(histogram) = workspace.grey_histogram(area) else {
                 continue;
@@ -161,7 +161,7 @@ impl SensorCalibration {
         Ok(seen)
     }
 
-    /// Refuses presses that leave out forces which scenes will have.
+    /// Refuses presses that do not cover the forces of later scenes.
     fn covered(&self, seen: &[Seen]) -> Result<(), SensorError> {
         let Some([least, greatest]) = self.covers_n else {
             return Ok(());
@@ -171,7 +171,7 @@ impl SensorCalibration {
             forces().fold(f64::INFINITY, f64::min),
             forces().fold(0.0, f64::max),
         ];
-        // A curve that starts at the origin is known somewhat below the least force.
+        // The curve starts at the origin, so that it is valid somewhat below the least force.
         if found[0] <= 2.0 * least && found[1] >= greatest {
             return Ok(());
         }
@@ -185,15 +185,15 @@ impl SensorCalibration {
         let forces = seen.iter().map(|s| self.presses[s.press].force_n);
         let largest = forces.fold(0.0, f64::max);
         let frames: Vec<CalibrationFrame> = seen.iter().map(|s| s.histogram.clone()).collect();
-        // The options take the noise as a share of the range, and none below its digits.
+        // The options take the noise as a share of the range, which may not be zero.
         let of_range = (self.gauge_noise_n / largest).max(1e-6);
         let curve = PressureCurveOptions::default()
             .with_force_error(CURVE_ERROR, of_range)
             .and_then(|options| PressureCurve::fit(&frames, &options))
             .map_err(SensorError::Curve)?;
         let report = &curve.report;
-        // Noise of the frames adds a little to the gauge's. A press whose force is wrong by a tenth
-        // makes the ratio 20.
+        // Noise of the frames adds a little to that of the gauge. A press whose force is wrong by a
+        // tenth makes the ratio 20.
         if report.residual_sd > 5.0 {
             let size = |k: usize| report.residuals_n[k].abs();
             let worst = (0..seen.len()).max_by(|a, b| size(*a).total_cmp(&size(*b)));
@@ -205,7 +205,7 @@ impl SensorCalibration {
         Ok(curve)
     }
 
-    /// Force and contact radius of every press, by the curve.
+    /// Force and contact radius of every press, from the curve.
     fn measured(
         &self,
         reference: &ReferenceFrame,

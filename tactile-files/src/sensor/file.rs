@@ -23,20 +23,20 @@ use tactile_imaging::pipeline::{LightContact, Object, Pipeline, PipelineError, R
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorGeometry {
-    /// The frame's outline: columns and rows.
+    /// Number of columns and rows of the frame.
     pub frame_px: [usize; 2],
-    /// Covariance of the lens's [h_x, h_y, k₁, k₂].
+    /// Covariance of the lens parameters [h_x, h_y, k₁, k₂].
     pub covariance: [[f64; 4]; 4],
-    /// Relative standard error of the target's own size.
+    /// Relative standard error of the size of the target.
     #[serde(deserialize_with = "not_negative")]
     pub target_error: f64,
-    /// Pixels to metres.
+    /// The map from pixels to metres.
     pub lens: LensGeometry,
 }
 
 impl SensorGeometry {
-    /// Relative standard error that all lengths share: that of √(h_x h_y), of the distortion at
-    /// half the frame's diagonal (ρ² = ¼) and of the target.
+    /// Relative standard error that all lengths share. It combines the errors of √(h_x h_y), of the
+    /// distortion at half the frame's diagonal (ρ² = ¼) and of the target.
     pub fn length_scale_error(&self) -> f64 {
         let [hx, hy] = self.lens.pixel_size_m();
         // ln √(h_x h_y (1 + 4 k₁ρ² + 6 k₂ρ⁴)) to first order, at ρ² = ¼.
@@ -62,7 +62,7 @@ impl SensorGeometry {
 /// let pipeline = sensor
 ///     .pipeline(ball)?
 ///     .with_settings(|s| s.assumptions.state(Source::ObjectSize, 5e-6 / 3e-3))?;
-/// // Its parts, for a pipeline that is put together by hand.
+/// // Its parts, for a pipeline that is assembled by hand.
 /// let (contact, guide) = (sensor.contact(&ForceOptions::default())?, sensor.waveguide()?);
 /// let by_hand = Pipeline::new(contact, ball)?.with_settings(|s| s.waveguide = Some(guide))?;
 /// println!("100 grey levels are {} Pa", sensor.curve.pressure_pa(100.0));
@@ -71,7 +71,7 @@ impl SensorGeometry {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
-/// A file that cannot be used is refused in one sentence:
+/// The error for an unusable file is one sentence:
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -86,7 +86,7 @@ impl SensorGeometry {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sensor {
-    /// When it was calibrated, as the user writes it.
+    /// Date of the calibration, as the user writes it.
     pub date: String,
     /// Temperature during the calibration, in degrees Celsius.
     #[serde(
@@ -100,8 +100,8 @@ pub struct Sensor {
     /// Relative standard error of the gauge, common to all forces.
     #[serde(deserialize_with = "not_negative")]
     pub gauge_error: f64,
-    /// Relative standard error of the light that an object couples beside what the calibrator
-    /// coupled. Zero under a fixed diffusing skin. `None`: that of
+    /// Relative standard error of the light that an object couples, compared with the calibrator.
+    /// Zero under a fixed diffusing skin. If `None`, the value of
     /// [`Assumption::ALL`](tactile_imaging::pipeline::Assumption::ALL) is assumed.
     #[serde(
         default,
@@ -109,18 +109,18 @@ pub struct Sensor {
         skip_serializing_if = "Option::is_none"
     )]
     pub coupling_error: Option<f64>,
-    /// Covariance of ln E of all layers, then of ln h, then of ν. Empty where nothing is known of
-    /// the layers' errors, and they are assumed.
+    /// Covariance of ln E of all layers, then ln h, then ν. If empty, the errors of the layers are
+    /// unknown and assumed.
     #[serde(default)]
     pub layer_covariance: Vec<Vec<f64>>,
-    /// Lens and outline.
+    /// Lens and frame size.
     pub geometry: SensorGeometry,
     /// Noise of one pixel of a frame.
     pub noise: NoiseModel,
-    /// Light of the reference that the curve was fitted on. A later reference is compared with it.
+    /// Light of the reference used for the curve. Later references are compared with it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub light: Option<ReferenceLight>,
-    /// Springs of shear, where they are known.
+    /// Shear stiffnesses, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shear: Option<ShearCalibration>,
     /// The guide's layers from the object's side, rigid if empty.
@@ -148,7 +148,7 @@ impl Sensor {
         }
     }
 
-    /// Writes the file.
+    /// Writes the sensor file.
     ///
     /// # Errors
     /// [`FileError::Write`].
@@ -164,7 +164,7 @@ impl Sensor {
         write_bytes(path, text.as_bytes())
     }
 
-    /// The guide, rigid without layers.
+    /// The guide, which is rigid without layers.
     ///
     /// # Errors
     /// [`PipelineError::Material`].
@@ -172,18 +172,18 @@ impl Sensor {
         guide(&self.layers).map_err(PipelineError::Material)
     }
 
-    /// The options that contacts are found with: changes of the lamps since the reference are
-    /// divided out where they are detected.
+    /// The options for finding contacts. Detected changes of the lamps since the reference are
+    /// divided out.
     pub(crate) fn force_options() -> ForceOptions {
         let contact = ContactOptions::default().with_drift(DriftCorrection::Automatic);
         ForceOptions::default().with_contact(contact)
     }
 
-    /// The stage from frame to force. It undistorts contours, turns grey levels into pressures and
-    /// carries the errors of both.
+    /// The stage from frame to force. It undistorts contours, converts grey levels to pressures and
+    /// propagates the errors of both.
     ///
     /// # Errors
-    /// [`PipelineError::Sensor`].
+    /// [`PipelineError::Sensor`] if the parts do not fit together.
     pub fn contact(&self, options: &ForceOptions) -> Result<LightContact, PipelineError> {
         let lens = self.geometry.lens;
         Ok(LightContact::new(self.curve.clone(), lens.pixel_size_m(), options)?.with_lens(lens))
@@ -202,7 +202,7 @@ impl Sensor {
     pub(crate) fn configured(&self, pipeline: Pipeline) -> Result<Pipeline, PipelineError> {
         let guide = self.waveguide()?;
         let n = self.layer_covariance.len();
-        // A row that is too short gives NaN, which the settings refuse.
+        // A row that is too short yields NaN, which the settings refuse.
         let entry = |i: usize, j: usize| self.layer_covariance[i].get(j).copied();
         let covariance = DMatrix::from_fn(n, n, |i, j| entry(i, j).unwrap_or(f64::NAN));
         pipeline.with_settings(|settings| {
@@ -222,7 +222,7 @@ impl Sensor {
         })
     }
 
-    /// A field with a value that no sensor has, and the expected one.
+    /// The name of an invalid field and the expected value. `None` if all are valid.
     fn mistake(&self) -> Option<(&'static str, String)> {
         let not_negative = |v: f64| v >= 0.0 && v.is_finite();
         if self.geometry.frame_px.contains(&0) {
@@ -242,7 +242,7 @@ impl Sensor {
         let (rows, expected) = (&self.layer_covariance, 3 * self.layers.len());
         let is_square = rows.len() == expected && rows.iter().all(|row| row.len() == expected);
         if !rows.is_empty() && !is_square {
-            let reason = format!("expected {expected} rows of {expected} numbers, three a layer");
+            let reason = format!("expected {expected} rows of {expected} numbers, three per layer");
             return Some(("layer_covariance", reason));
         }
         let is_variance = |(i, row): (usize, &Vec<f64>)| {

@@ -1,12 +1,11 @@
-//! The findings of a sensor's calibration, press by press and layer by layer, and why there are
-//! none.
+//! The findings of a sensor calibration per press and per layer, and its errors.
 use super::input::Indenter;
 use crate::io::FileError;
 use tactile_imaging::force::{Branch, Estimate, ForceError};
 use tactile_imaging::pipeline::PipelineError;
 
 /// Why a sensor could not be calibrated, in one sentence. Presses are counted from 1 in the
-/// sentences and from 0 in the fields.
+/// messages and from 0 in the fields.
 ///
 /// ```
 /// use tactile_files::sensor::SensorError;
@@ -25,26 +24,26 @@ pub enum SensorError {
          light-to-pressure curve"
     )]
     TooFewPresses {
-        /// Presses that can be used.
+        /// Number of presses that can be used.
         found: usize,
-        /// How many are needed.
+        /// Smallest number that is needed.
         expected: usize,
     },
-    /// A press that should have one shows no contact, or cannot be measured.
+    /// A press shows no contact although it should, or cannot be measured.
     #[error("press {}: {source}", press + 1)]
     Press {
         /// The press.
         press: usize,
-        /// What is wrong with it.
+        /// The fault of the press.
         source: ForceError,
     },
-    /// A frame's reference cannot be used.
+    /// The reference frame cannot be used.
     #[error("the reference: {0}")]
     Reference(#[source] ForceError),
     /// The presses do not determine the curve.
     #[error("the presses do not determine the light-to-pressure curve: {0}")]
     Curve(#[source] ForceError),
-    /// The curve leaves a scatter beyond what the gauge explains.
+    /// The forces scatter about the curve by more than the errors of the gauge.
     #[error(
         "the forces scatter by {scatter:.1} times their stated error about the light-to-pressure \
          curve: check press {}, the worst",
@@ -56,7 +55,7 @@ pub enum SensorError {
         /// The press with the largest residual.
         worst: usize,
     },
-    /// The presses leave out forces that scenes will have.
+    /// The presses do not cover the forces of later scenes.
     #[error(
         "the presses reach from {:.3} N to {:.3} N, but scenes will have {:.3} N to {:.3} N",
         found[0],
@@ -67,21 +66,21 @@ pub enum SensorError {
     NotCovered {
         /// Least and greatest force of the presses.
         found: [f64; 2],
-        /// Those of the scenes.
+        /// Least and greatest force of the scenes.
         expected: [f64; 2],
     },
     /// The target's dots cannot be found or do not lie on a grid.
     #[error("the target: {found} dots on a grid, at least {expected} are needed")]
     Target {
-        /// Dots with a place on the grid.
+        /// Number of dots with a place on the grid.
         found: usize,
-        /// How many are needed.
+        /// Smallest number that is needed.
         expected: usize,
     },
     /// The target's dots do not determine the lens.
     #[error("the target does not determine the lens: {0}")]
     Lens(#[source] ForceError),
-    /// The contact radii do not go with the forces of a ball on these layers.
+    /// The contact radii do not fit the forces of a ball on these layers.
     #[error(
         "the contact radii under the ball of {radius_m:e} m do not fit layers of the stated errors \
          (off by {deviation:.1} standard errors): check the ball's radius and the forces"
@@ -89,15 +88,15 @@ pub enum SensorError {
     Radius {
         /// The ball's stated radius.
         radius_m: f64,
-        /// How far off, in standard errors.
+        /// The deviation in standard errors.
         deviation: f64,
     },
-    /// Something cannot be built from what was fitted.
+    /// The fitted values cannot form a pipeline.
     #[error(transparent)]
     Pipeline(#[from] PipelineError),
 }
 
-/// What one press was found to be.
+/// The findings for one press.
 ///
 /// ```
 /// use tactile_imaging::force::{Branch, Estimate};
@@ -114,23 +113,23 @@ pub enum SensorError {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PressFinding {
-    /// What was pressed.
+    /// The pressed object.
     pub indenter: Indenter,
-    /// Rising or falling force.
+    /// Whether the force was rising or falling.
     pub branch: Branch,
     /// The gauge's force in newtons.
     pub force_n: f64,
-    /// The force read from the frame with the fitted curve. `None` where no contact is seen, and
-    /// the press was not used.
+    /// The force read from the frame with the fitted curve. `None` if no contact is seen; the press
+    /// is then not used.
     pub read_force_n: Option<f64>,
-    /// The fitted contact radius.
+    /// The fitted contact radius. `None` if no contact is seen.
     pub contact_radius_m: Option<Estimate>,
-    /// The force that the fitted layers have at that radius. `None` for presses that the layers
-    /// were not fitted to.
+    /// The force that the fitted layers predict at this radius. `None` if the press was not used
+    /// for the layers.
     pub layers_force_n: Option<f64>,
 }
 
-/// One parameter of a layer before and after the calibration.
+/// A parameter of a layer before and after the calibration.
 ///
 /// ```
 /// use tactile_files::sensor::LayerFinding;
@@ -146,15 +145,15 @@ pub struct PressFinding {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LayerFinding {
-    /// The layer, counted from the object's side from 0.
+    /// Index of the layer, from 0 on the object's side.
     pub layer: usize,
-    /// The field of the sensor file.
+    /// Name of the field in the sensor file.
     pub parameter: &'static str,
-    /// The user's statement.
+    /// The value stated by the user.
     pub stated: Estimate,
-    /// The estimate from the presses and the statement together.
+    /// The estimate from the presses and the stated value together.
     pub fitted: Estimate,
-    /// Whether the presses determine it: its error fell below 0.7 times the stated one. A parameter
-    /// that is not identified keeps its statement.
+    /// Whether the presses determine the parameter, so that its error is below 0.7 times the stated
+    /// error. Otherwise it keeps its stated value.
     pub identified: bool,
 }

@@ -9,7 +9,7 @@ use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use tactile_imaging::force::{Branch, ShearCalibration};
 
-/// What a calibration presses on the sensor.
+/// An object that is pressed on the sensor for calibration.
 ///
 /// ```
 /// use tactile_files::sensor::Indenter;
@@ -18,21 +18,22 @@ use tactile_imaging::force::{Branch, ShearCalibration};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Indenter {
-    /// A rigid ball. The curve is fitted to its forces, and the layers to its contact radii.
+    /// A rigid ball. The curve is fitted to the forces and the layers to the contact radii.
     Ball {
         /// Radius in metres.
         radius_m: f64,
         /// Standard error of the radius in metres.
         radius_error_m: f64,
     },
-    /// A rigid flat punch. The curve alone is fitted to it, as its contact radius is its own.
+    /// A rigid flat punch. Only the curve is fitted to it, because its contact radius is constant.
     Punch {
         /// Radius in metres.
         radius_m: f64,
     },
 }
 
-/// A layer as its maker states it, with standard errors. A calibration starts from these.
+/// A layer with the manufacturer's values and their standard errors, from which a calibration
+/// starts.
 ///
 /// ```
 /// use tactile_files::{scene::SceneLayer, sensor::LayerInput};
@@ -62,7 +63,7 @@ pub struct LayerInput {
     pub poisson_ratio_error: f64,
 }
 
-/// A frame under a gauge's force.
+/// A frame under a known force.
 ///
 /// ```
 /// use tactile_imaging::force::Branch;
@@ -79,20 +80,20 @@ pub struct LayerInput {
 pub struct SensorPress {
     /// The frame.
     pub frame: Array2<u8>,
-    /// The gauge's force in newtons.
+    /// The force of the gauge in newtons.
     pub force_n: f64,
     /// Whether the force was rising or falling.
     pub branch: Branch,
-    /// What was pressed.
+    /// The pressed object.
     pub indenter: Indenter,
 }
 
-/// What a sensor is calibrated from.
+/// The input of a sensor calibration.
 ///
-/// The curve f of P = f(I) comes from the grey histograms of the presses' contacts, F = Σ f(I) dS.
-/// The lens comes from a target, vignetting from the reference itself, and the layers' moduli from
-/// the contact radii of rigid balls. Parameters that the presses do not determine keep the stated
-/// value and error.
+/// The curve f in P = f(I) is fitted to the grey histograms of the contacts, F = Σ f(I) dS. The
+/// lens comes from a target, the vignetting from the reference, and the moduli of the layers from
+/// the contact radii of rigid balls. Parameters that the presses do not determine keep their stated
+/// values and errors.
 ///
 /// ```no_run
 /// use tactile_files::sensor::SensorCalibration;
@@ -105,7 +106,7 @@ pub struct SensorPress {
 /// ```
 #[derive(Clone, Debug)]
 pub struct SensorCalibration {
-    /// When, as the user writes it.
+    /// Date of the calibration, as the user writes it.
     pub date: String,
     /// Temperature in degrees Celsius.
     pub temperature_c: Option<f64>,
@@ -124,14 +125,15 @@ pub struct SensorCalibration {
     pub flat_field: bool,
     /// Relative standard error of the gauge, common to all presses.
     pub gauge_error: f64,
-    /// Relative standard error of the light of other objects, see [`Sensor`](super::Sensor).
+    /// Relative standard error of the light that other objects couple, see
+    /// [`Sensor`](super::Sensor).
     pub coupling_error: Option<f64>,
-    /// Standard deviation of the gauge's noise in newtons.
+    /// Standard deviation of the gauge noise in newtons.
     pub gauge_noise_n: f64,
-    /// Springs of shear, passed on as they are.
+    /// Shear stiffnesses, which are copied to the sensor file.
     pub shear: Option<ShearCalibration>,
-    /// Least and greatest force in newtons that scenes will have. Presses that do not cover them
-    /// are refused.
+    /// Least and greatest force of later scenes in newtons. Presses that do not cover them are
+    /// refused.
     pub covers_n: Option<[f64; 2]>,
 }
 
@@ -175,7 +177,7 @@ impl SensorCalibration {
     }
 }
 
-/// A calibration file as it stands.
+/// The fields of a calibration file, unchecked.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CalibrationFile {
@@ -204,7 +206,7 @@ struct CalibrationFile {
     layers: Vec<LayerTable>,
 }
 
-/// The relative error of a size or a gauge where none is stated.
+/// The relative error of a size or a gauge if none is stated.
 fn per_mille() -> f64 {
     1e-3
 }
@@ -287,7 +289,7 @@ impl CalibrationFile {
         let references = self.references.iter();
         let references = references.map(|name| image("references", name, None));
         let references = references.collect::<Result<Vec<_>, _>>()?;
-        // All images are of one camera.
+        // All images come from one camera and have one size.
         let size = references.first().map(Array2::dim);
         let mut presses = Vec::with_capacity(self.presses.len());
         for (k, table) in self.presses.iter().enumerate() {
@@ -324,7 +326,7 @@ impl CalibrationFile {
             presses,
             target,
             pixel_size_m: (pixel_size_m, self.pixel_size_error),
-            // Springs of shear come from another experiment, and the program adds them.
+            // Shear stiffnesses come from another experiment. The program adds them.
             shear: None,
             layers: self.layers.iter().map(LayerTable::layer).collect(),
             flat_field: self.flat_field.unwrap_or(true),

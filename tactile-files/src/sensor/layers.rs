@@ -1,9 +1,9 @@
-//! The fit of the guide's layers to contact radii of rigid balls.
+//! Fits the layers of the guide to contact radii of rigid balls.
 //!
 //! ln F = ln(4/3 a³/R) + ln E_g(a, layers), with E_g from the layer equation. The parameters are ln
 //! E, ln h and ν of all layers, ln R of every ball, and one factor on all forces, because the
 //! parabola of the theory is not a ball. All start from their stated values, with the stated errors
-//! as a prior. Parameters that the presses do not determine stay as they were stated.
+//! as a prior. Parameters that the presses do not determine keep their stated values.
 use super::findings::{LayerFinding, PressFinding, SensorError};
 use super::input::{Indenter, LayerInput};
 use crate::scene::{SceneLayer, elastic_layers};
@@ -27,46 +27,46 @@ struct BallContact {
     radius_error: f64,
 }
 
-/// A ball as stated.
+/// A ball with its stated values.
 #[derive(Clone, Copy, Debug)]
 struct Ball {
     radius_m: f64,
-    /// Relative.
+    /// Relative standard error of the radius.
     radius_error: f64,
 }
 
 /// The layers with their errors.
 #[derive(Clone, Debug)]
 pub(super) struct LayerFit {
-    /// Fitted, or as stated where no press could be used.
+    /// The fitted layers, or the stated ones if no press could be used.
     pub layers: Vec<SceneLayer>,
-    /// Of ln E, ln h and ν of all layers.
+    /// Covariance of ln E, ln h and ν of all layers.
     covariance: DMatrix<f64>,
 }
 
 impl LayerFit {
-    /// The covariance as a sensor file has it.
+    /// The covariance as rows for the sensor file.
     pub(super) fn covariance_rows(&self) -> Vec<Vec<f64>> {
         let rows = self.covariance.row_iter();
         rows.map(|row| row.iter().copied().collect()).collect()
     }
 }
 
-/// Nodes in ln a between which ln E_g is a polynomial. Five leave an error of 10⁻⁵ over a decade,
+/// Number of nodes in ln a for the polynomial of ln E_g. Five leave an error of 10⁻⁵ over a decade,
 /// and each costs a solution of the layer equation.
 const NODES: usize = 5;
-/// Standard errors by which a stated value, or the whole fit, may be off before it is refused.
+/// Largest deviation of a stated value, or of the whole fit, in standard errors.
 const LARGEST_DEVIATION: f64 = 4.0;
-/// Standard error of a parameter that is stated as exact, far below any that presses determine.
+/// Standard error of a parameter that is stated as exact, far below what presses can determine.
 const EXACT: f64 = 1e-6;
-/// Relative error of a contact radius beside the frame's noise: the profile of a guide that ends is
-/// not quite Hertz's.
+/// Relative error of a contact radius beyond the noise of the frame, because the pressure profile
+/// on a guide of finite thickness differs from Hertz's.
 const PROFILE_ERROR: f64 = 5e-4;
 
-/// Fits the layers to the contacts of balls, and notes the force that they have there.
+/// Fits the layers to the contacts of balls, and stores the force that they predict for each press.
 ///
 /// # Errors
-/// [`SensorError::Radius`] where the contacts contradict the statements.
+/// [`SensorError::Radius`] if the contacts contradict the stated values.
 pub(super) fn fit(
     stated: &[LayerInput],
     gauge_noise_n: f64,
@@ -91,11 +91,11 @@ pub(super) fn fit(
         else {
             continue;
         };
-        // Beyond half the ball's radius, a ball is no parabola.
+        // Beyond half its radius a ball differs too much from a parabola.
         if radius.value > 0.5 * radius_m || press.force_n <= 0.0 {
             continue;
         }
-        // Presses of equal radius are of one ball, whose error they share.
+        // Presses of equal radius use the same ball and share its error.
         let known = balls.iter().position(|b| b.radius_m == radius_m);
         let ball = known.unwrap_or_else(|| {
             balls.push(Ball {
@@ -147,7 +147,7 @@ pub(super) fn fit(
     })
 }
 
-/// Every parameter of the layers before and after the fit.
+/// All parameters of the layers before and after the fit.
 pub(super) fn findings(stated: &[LayerInput], fit: &LayerFit) -> Vec<LayerFinding> {
     let n = stated.len();
     let mut findings = Vec::with_capacity(3 * n);
@@ -189,7 +189,7 @@ fn parameter_errors(input: &LayerInput) -> [f64; 3] {
     ]
 }
 
-/// ln E_g over ln a: the polynomial through Chebyshev's nodes.
+/// ln E_g as a function of ln a: a polynomial through Chebyshev nodes.
 struct Stiffness {
     nodes: [f64; NODES],
     values: [f64; NODES],
@@ -200,9 +200,9 @@ impl Stiffness {
         let logs: DVector<f64> =
             DVector::from_iterator(contacts.len(), contacts.iter().map(|c| c.radius_m.ln()));
         let (low, high) = (logs.min(), logs.max());
-        // A single radius has a span of its own, so that no nodes coincide.
+        // A single radius gets a minimum span, so that no nodes coincide.
         let half = (0.5 * (high - low)).max(0.05);
-        // Chebyshev's nodes keep the interpolation from swinging at the ends.
+        // Chebyshev nodes keep the interpolation from oscillating at the ends.
         let nodes = std::array::from_fn(|k| {
             let angle = std::f64::consts::PI * (k as f64 + 0.5) / NODES as f64;
             0.5 * (low + high) - half * angle.cos()
@@ -214,7 +214,7 @@ impl Stiffness {
         Some(Self { nodes, values })
     }
 
-    /// Lagrange's interpolation.
+    /// Lagrange interpolation at a radius.
     fn at(&self, radius_m: f64) -> f64 {
         let x = radius_m.ln();
         let weight = |k: usize| {
@@ -230,18 +230,18 @@ impl Stiffness {
 struct Problem<'a> {
     balls: &'a [Ball],
     contacts: &'a [BallContact],
-    /// Prior standard errors: of the layers' parameters, of ln R of every ball, of the common
+    /// Prior standard errors of the layer parameters, of ln R of every ball and of the common
     /// factor.
     prior: DVector<f64>,
     layer_parameters: usize,
-    /// How much of the common factor every contact has.
+    /// Weight of the common factor in every contact.
     model: Vec<f64>,
 }
 
 struct Solution {
     parameters: DVector<f64>,
     covariance: DMatrix<f64>,
-    /// Residuals over the standard errors of the presses alone.
+    /// Sum of squared residuals over the standard errors of the presses alone.
     chi_squared: f64,
 }
 
@@ -269,7 +269,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// ln F of every contact by the law.
+    /// ln F of every contact, as predicted by the law.
     fn predicted(&self, layers: &[Layer], parameters: &DVector<f64>) -> Option<Vec<f64>> {
         let n = self.layer_parameters;
         let step = parameters.rows(0, n).into_owned();
@@ -291,23 +291,25 @@ impl<'a> Problem<'a> {
     }
 
     fn variance(&self, contact: &BallContact) -> f64 {
-        // F goes as the third power of the radius, and a little faster on layers that end.
+        // F grows as the third power of the radius, and a little faster on layers of finite
+        // thickness.
         contact.force_error.powi(2) + (3.2 * contact.radius_error).powi(2)
     }
 
-    /// Gauss and Newton's steps on residuals and priors.
+    /// Gauss–Newton steps on residuals and priors.
     fn solve(&self, layers: &[Layer]) -> Option<Solution> {
         let count = self.prior.len();
         let mut parameters = DVector::zeros(count);
         let mut covariance = DMatrix::zeros(count, count);
-        // The law is nearly linear in the logarithms. A step of a tenth leaves some 10⁻³ of itself.
+        // The law is nearly linear in the logarithms. A step of 0.1 leaves an error of some 10⁻³ of
+        // the step.
         for _ in 0..4 {
             let here = self.predicted(layers, &parameters)?;
-            // Parameters that are stated as exact do not move.
+            // Parameters stated as exact are held fixed.
             let moves = |k: usize| self.prior[k] > EXACT;
             let slopes =
                 parameter_slopes(&here, &parameters, moves, |x| self.predicted(layers, x))?;
-            // The priors keep the normal equations regular where the presses determine nothing.
+            // The priors keep the normal equations regular even if the presses determine nothing.
             let mut normal = DMatrix::from_diagonal(&self.prior.map(|sd| (sd * sd).recip()));
             let mut right = -(&normal * &parameters);
             for (i, contact) in self.contacts.iter().enumerate() {
@@ -330,20 +332,20 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// Refuses a fit that needs a stated value far from what was stated, or that does not fit.
+    /// Refuses a fit that moves a stated value too far or leaves too large residuals.
     fn plausible(&self, solution: &Solution) -> Result<(), SensorError> {
         let moved = solution.parameters.component_div(&self.prior);
         let freedom = self.contacts.len() as f64;
         let excess = (solution.chi_squared - freedom) / (2.0 * freedom).sqrt();
         let deviation = moved.norm();
-        // The stated errors of the presses are those of noise alone. Ten times their χ² is a wrong
-        // law, not a wrong error.
+        // The errors of the presses are those of noise alone. Ten times their χ² shows a wrong law,
+        // not a wrong error.
         let misfit = solution.chi_squared > 10.0 * freedom && excess > LARGEST_DEVIATION;
         if deviation <= LARGEST_DEVIATION && !misfit {
             return Ok(());
         }
         let n = self.layer_parameters;
-        // The sentence names the ball that moved the most.
+        // The message names the ball that moved the most.
         let worst = (0..self.balls.len())
             .max_by(|i, j| moved[n + i].abs().total_cmp(&moved[n + j].abs()))
             .unwrap_or(0);

@@ -1,4 +1,5 @@
-//! A sensor: its lens, light and layers with their errors, calibrated once and kept in a TOML file.
+//! A sensor with its lens, light and layers and their errors, calibrated once and kept in a TOML
+//! file.
 //!
 //! ```toml
 //! date = "2026-11-22"
@@ -33,8 +34,8 @@
 //! # [shear]                              # springs K_x and K_y, where they are known
 //! ```
 //!
-//! [`SensorCalibration`] makes the file from presses of balls and punches of known radius. A scene
-//! names it with `sensor = "sensor.toml"`.
+//! [`SensorCalibration`] creates the file from presses of balls and punches of known radius. A
+//! scene refers to it with `sensor = "sensor.toml"`.
 mod calibration;
 mod file;
 mod findings;

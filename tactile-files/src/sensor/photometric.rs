@@ -1,4 +1,4 @@
-//! Sensors with a gel that is lit in colours: calibration file and sensor file.
+//! Sensors with a gel lit in colours: calibration file and sensor file.
 use crate::io::{
     FileError, beside, length, one_or_more, positive, read_bytes, read_colour_levels, read_toml,
     write_bytes, write_colour_image,
@@ -12,7 +12,7 @@ use tactile_imaging::gel::{
     GelSensor,
 };
 
-/// Presses of balls on a gel that is lit in colours, as a calibration file names them.
+/// Presses of balls on a gel lit in colours, as named in a calibration file.
 ///
 /// ```toml
 /// kind = "photometric"
@@ -45,18 +45,18 @@ pub struct PhotometricPresses {
     pub pixel_size_m: f64,
     /// Images of the presses, as the file names them.
     pub names: Vec<PathBuf>,
-    /// The gel's layer, and what stands under known weights: frame and force.
+    /// The gel layer, and frames under known weights.
     gel: Option<(GelLayer, Vec<KnownWeight>)>,
-    /// Frames of one body, and what a gauge read under them in newtons.
+    /// Frames of one body, with the gauge reading of each in newtons.
     gauge: Vec<(Array3<u8>, f64)>,
-    /// Frame, ball's radius in metres and drawn circle of each press.
+    /// Frame, ball radius in metres and drawn circle of each press.
     presses: Vec<(Array3<u8>, f64, Option<[f64; 3]>)>,
 }
 
-/// A frame of what stands under a weight, and the weight's force in newtons.
+/// A frame of a body under a weight, and the force of the weight in newtons.
 type KnownWeight = (Array3<u8>, Estimate);
 
-/// The word of `kind` in files of these sensors.
+/// The value of `kind` in files of these sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Kind {
@@ -169,12 +169,12 @@ impl PhotometricPresses {
         })
     }
 
-    /// Calibrates the sensor, and its forces. Where weights are given, the gel's modulus is that under
-    /// which the sensor reads them.
+    /// Calibrates the sensor and its forces. If weights are given, the modulus of the gel is chosen
+    /// so that the sensor reads them correctly.
     ///
     /// # Errors
-    /// Those of [`GelSensor::calibrate`], and [`GelError::NoContact`] for a weight or a gauge's reading
-    /// without contact.
+    /// The errors of [`GelSensor::calibrate`], and [`GelError::NoContact`] if a weight or a gauge
+    /// reading shows no contact.
     pub fn calibrate(&self) -> Result<(CalibratedGel, CalibrationReport), GelError> {
         let presses = self
             .presses
@@ -206,7 +206,7 @@ impl PhotometricPresses {
     }
 }
 
-/// The law of a gauge's readings. `None` without any.
+/// The force law from gauge readings. `None` without readings.
 fn gauge_force(
     sensor: &GelSensor,
     readings: &[(Array3<u8>, f64)],
@@ -225,22 +225,22 @@ fn gauge_force(
     GaugeForce::fit(&pairs).map(Some)
 }
 
-/// A calibrated gel: its sensor, and where its forces come from.
+/// A calibrated gel: its sensor and the source of its forces.
 #[derive(Clone, Debug)]
 pub struct CalibratedGel {
     /// The sensor.
     pub sensor: GelSensor,
-    /// The gel's layer, where it is known.
+    /// The gel layer, if known.
     pub layer: Option<GelLayer>,
-    /// Forces by a gauge's readings, where there are some.
+    /// The force law from gauge readings, if there are any.
     pub gauge: Option<GaugeForce>,
 }
 
 impl CalibratedGel {
-    /// The law of the forces: that of the layer, or else that of the gauge. `None` without either.
+    /// The force law: that of the layer, else that of the gauge. `None` without both.
     ///
     /// # Errors
-    /// Those of [`GelForce::new`].
+    /// The errors of [`GelForce::new`].
     pub fn law(&self) -> Result<Option<GelLaw>, GelError> {
         match (self.layer, self.gauge) {
             (Some(layer), _) => {
@@ -296,7 +296,7 @@ impl GelTable {
     }
 }
 
-/// The layer of gel on its rigid plate, as the files of a sensor name it in `[gel]`.
+/// The gel layer on its rigid plate, table `[gel]` of the files.
 fn check(gel: &GelLayer, path: &Path) -> Result<(), FileError> {
     let error = gel.youngs_modulus_error_pa;
     if !(error >= 0.0 && error.is_finite()) {
@@ -311,7 +311,7 @@ fn check(gel: &GelLayer, path: &Path) -> Result<(), FileError> {
     guide.map_err(|error| FileError::field(path, "gel", error))
 }
 
-/// The colour image that a field of `file` names, of the reference's size.
+/// The colour image that a field of `file` names. It must have the size of the reference.
 fn frame(
     file: &Path,
     field: &str,
@@ -347,18 +347,19 @@ pub struct PhotometricSensor {
     kind: Kind,
     /// Frame without contact, relative to the sensor file.
     pub reference: PathBuf,
-    /// Numbers of the calibration.
+    /// The fitted model.
     pub model: GelModel,
-    /// The gel's layer, for forces.
+    /// The gel layer, for forces.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gel: Option<GelLayer>,
-    /// The law of a gauge's readings, for forces without a layer.
+    /// The force law from gauge readings, for a gel without a known layer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gauge: Option<GaugeForce>,
 }
 
 impl PhotometricSensor {
-    /// The file of a calibrated gel, with its frame without contact relative to the file.
+    /// The sensor file of a calibrated gel. `reference` is the frame without contact, relative to
+    /// the file.
     pub fn of(reference: impl Into<PathBuf>, gel: &CalibratedGel) -> Self {
         Self {
             kind: Kind::Photometric,
@@ -369,10 +370,10 @@ impl PhotometricSensor {
         }
     }
 
-    /// The file's text.
+    /// The text of the file.
     ///
     /// # Errors
-    /// Those of the TOML writer, for numbers that it cannot hold.
+    /// The errors of the TOML writer, for numbers that it cannot represent.
     pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
         toml::to_string(self)
     }

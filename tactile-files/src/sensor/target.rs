@@ -1,22 +1,22 @@
-//! The dots of a target: found in its frame, and given their places on the grid.
+//! Finds the dots of a target and their places on the grid.
 use super::findings::SensorError;
 use ndarray::ArrayView2;
 use tactile_imaging::core::{otsu, regions};
 use tactile_imaging::force::DotPair;
 
-/// Enough for six parameters of the lens with a residual.
+/// Enough to fit six parameters of the lens and judge the residual.
 const FEWEST_DOTS: usize = 20;
 
-/// Finds the dots of a target, dark on bright or bright on dark, and pairs them with their places
-/// on a square grid.
+/// Finds the dots of a target, dark on bright or bright on dark, and assigns them to places on a
+/// square grid.
 ///
-/// The frame is cut at the mean of its two levels (Otsu's threshold). Dots are its connected
-/// regions of the rarer level, those that touch the edge left out, and their centres weighted with
-/// the level. The grid is followed from dot to dot out of the middle, each next place from its
-/// neighbours', so that distortion does no harm. O(pixels).
+/// The frame is split at Otsu's threshold. Dots are the connected regions of the rarer level that
+/// do not touch the edge, and their centres are weighted with the level. The grid is followed from
+/// dot to dot, starting at the centre. Each place is predicted from its neighbours, so that
+/// distortion does not matter. The cost is O(pixels).
 ///
 /// # Errors
-/// [`SensorError::Target`] for fewer than twenty dots on the grid.
+/// [`SensorError::Target`] if fewer than twenty dots lie on the grid.
 pub(super) fn find_dots(
     frame: ArrayView2<'_, u8>,
     pitch_m: f64,
@@ -36,7 +36,7 @@ pub(super) fn find_dots(
     Ok(placed.iter().map(pair).collect())
 }
 
-/// Centres (x, y) of the connected regions of the rarer level.
+/// Centres (x, y) of connected regions of the rarer level.
 fn centres(frame: ArrayView2<'_, u8>) -> Vec<[f64; 2]> {
     let mut histogram = [0.0; 256];
     frame.iter().for_each(|v| histogram[usize::from(*v)] += 1.0);
@@ -58,14 +58,14 @@ fn centres(frame: ArrayView2<'_, u8>) -> Vec<[f64; 2]> {
             sums[2] += weight * r as f64;
             inside &= r > 0 && c > 0 && r + 1 < rows && c + 1 < columns;
         }
-        // Smaller blobs are noise.
+        // Smaller regions are noise.
         let is_dot = inside && region.len() >= 9;
         is_dot.then(|| [sums[1] / sums[0], sums[2] / sums[0]])
     };
     regions(&mut open, columns).filter_map(centre).collect()
 }
 
-/// Dots with their places on the grid, followed from the dot nearest to the frame's middle.
+/// Dots with their places on the grid, followed from the dot nearest to the centre of the frame.
 fn on_grid(dots: &[[f64; 2]], (rows, columns): (usize, usize)) -> Vec<(usize, [i32; 2])> {
     let middle = [0.5 * columns as f64, 0.5 * rows as f64];
     let Some(first) = nearest(dots, middle, f64::INFINITY) else {
@@ -74,7 +74,7 @@ fn on_grid(dots: &[[f64; 2]], (rows, columns): (usize, usize)) -> Vec<(usize, [i
     let Some(along) = first_step(dots, first) else {
         return Vec::new();
     };
-    // The other axis of a square grid; pixels are nearly square.
+    // The second axis is perpendicular, because grid and pixels are nearly square.
     let steps = [along, [-along[1], along[0]]];
     let mut placed = vec![(first, [0, 0], steps)];
     let mut taken = vec![false; dots.len()];
@@ -85,7 +85,8 @@ fn on_grid(dots: &[[f64; 2]], (rows, columns): (usize, usize)) -> Vec<(usize, [i
         for (axis, sign) in [(0, 1), (0, -1), (1, 1), (1, -1)] {
             let step = steps[axis].map(|s| s * f64::from(sign));
             let expected = [dots[from][0] + step[0], dots[from][1] + step[1]];
-            // Distortion bends the grid by less than a quarter of the pitch from dot to dot.
+            // Between neighbouring dots, distortion bends the grid by less than a quarter of the
+            // pitch.
             let reach = 0.25 * step[0].hypot(step[1]);
             let Some(dot) = nearest(dots, expected, reach).filter(|dot| !taken[*dot]) else {
                 continue;
@@ -93,7 +94,7 @@ fn on_grid(dots: &[[f64; 2]], (rows, columns): (usize, usize)) -> Vec<(usize, [i
             taken[dot] = true;
             let mut there = place;
             there[axis] += sign;
-            // The step that was made is the better guess for the next one.
+            // The last step is a better guess for the next one.
             let mut guess = steps;
             guess[axis] = [
                 f64::from(sign) * (dots[dot][0] - dots[from][0]),

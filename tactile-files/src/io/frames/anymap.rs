@@ -1,4 +1,4 @@
-//! Binary PGM and PPM images one after the other.
+//! Streams of binary PGM and PPM images.
 use super::super::image::header_words;
 use super::{Broken, Decoder, Encoded, Format, LONGEST_HEADER, append, is_read, quoted};
 use std::io::{BufRead, Read, Result as IoResult};
@@ -30,13 +30,13 @@ impl Decoder for Anymaps {
     }
 }
 
-/// The header of the next PGM or PPM up to the byte before its samples. None at the end.
+/// The header of the next PGM or PPM, up to the byte before its samples. `None` at the end.
 fn anymap_header(input: &mut dyn BufRead) -> IoResult<Option<Vec<u8>>> {
     let mut header = Vec::new();
     let (mut words, mut in_word, mut in_comment) = (0, false, false);
     for byte in input.take(LONGEST_HEADER).bytes() {
         let byte = byte?;
-        // Some writers end an image with a line's end.
+        // Some writers put a line break after an image.
         if header.is_empty() && byte.is_ascii_whitespace() {
             continue;
         }

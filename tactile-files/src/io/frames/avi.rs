@@ -10,18 +10,19 @@ pub(super) const FORMAT: Format = Format {
     open: |input| Ok(Box::new(Avi::open(input)?)),
 };
 
-/// The chunks of an AVI file up to its frames, and these.
+/// The chunks of an AVI file: its headers, then its frames.
 ///
-/// Lists are entered and their sizes are not asked for: a recorder that was killed left them open.
+/// Lists are entered without regard to their sizes, because a recorder that was killed leaves them
+/// unset.
 #[derive(Default)]
 struct Avi {
     rate_hz: Option<f64>,
-    /// Streams that were announced, and which of them is the video.
+    /// Number of announced streams, and the index of the video stream.
     streams: usize,
     video: Option<usize>,
-    /// The number of frames that the header announces. It is none in a file that was left open.
+    /// The number of frames that the header announces. It is zero in a file that was not closed.
     announced: u64,
-    /// Frames so far, those that the recorder dropped included, and these.
+    /// Number of frames so far, including dropped ones, and number of dropped frames.
     frames: u64,
     dropped: u64,
     pixels: Pixels,
@@ -34,11 +35,11 @@ struct Avi {
 enum Pixels {
     #[default]
     Jpeg,
-    /// The luma of all pixels comes first.
+    /// The luma of all pixels is stored first.
     Planar,
-    /// Luma and chroma by turns, the luma at this byte of two.
+    /// Luma and chroma alternate, with the luma at this byte of two.
     Packed(usize),
-    /// Blue, green and red, the lowest row first.
+    /// Blue, green and red, with the lowest row first.
     Bgr,
 }
 
@@ -119,7 +120,7 @@ impl Avi {
     fn frame(&self, mut bytes: Vec<u8>) -> Result<Encoded, Broken> {
         let (columns, rows) = (self.columns, self.rows);
         let pixels = columns * rows;
-        // Rows of colours are filled up to a multiple of four bytes.
+        // Colour rows are padded to a multiple of four bytes.
         let width = (3 * columns).next_multiple_of(4);
         let needed = match self.pixels {
             Pixels::Jpeg => return Ok(Encoded::File(with_tables(bytes).into())),
@@ -149,7 +150,7 @@ impl Avi {
 }
 
 impl Decoder for Avi {
-    /// Empty chunks, which cameras write for frames that they dropped, are passed over and counted.
+    /// Empty chunks, which cameras write for dropped frames, are skipped and counted.
     fn next(&mut self, input: &mut dyn BufRead, _: Vec<u8>) -> Result<Option<Encoded>, Broken> {
         while let Some((name, size)) = chunk(input)? {
             if is_list(&name) {
@@ -201,7 +202,8 @@ fn is_list(name: &[u8; 4]) -> bool {
     [b"RIFF", b"LIST"].contains(&name)
 }
 
-/// Name and size of the next chunk. None at the end, also where a chunk's header is cut.
+/// Name and size of the next chunk. `None` at the end of the file or if the header of the chunk is
+/// cut short.
 fn chunk(input: &mut dyn BufRead) -> IoResult<Option<([u8; 4], usize)>> {
     let mut head = Vec::new();
     append(input, 8, &mut head)?;

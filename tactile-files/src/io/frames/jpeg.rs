@@ -1,5 +1,5 @@
-//! JPEG and PNG images one after the other, as `ffmpeg -f image2pipe` and recorders of cameras write
-//! them, and the tables that JPEG frames of webcams leave out.
+//! Streams of JPEG and PNG images, as `ffmpeg -f image2pipe` and camera recorders write them, and
+//! the tables that JPEG frames of webcams leave out.
 use super::super::files::LARGEST_FILE;
 use super::{Broken, Decoder, Encoded, Format, append};
 use std::io::{BufRead, Read, Result as IoResult};
@@ -9,7 +9,7 @@ const STARTS: [&[u8]; 2] = [b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"];
 
 pub(super) const FORMAT: Format = Format {
     name: "PNG, JPEG",
-    // Cameras in a network separate images by lines that begin so.
+    // Network cameras separate images by lines that begin with two hyphens.
     begins: |start| start.starts_with(b"--") || STARTS.iter().any(|image| start.starts_with(image)),
     open: |_| Ok(Box::new(Images::default())),
 };
@@ -20,7 +20,7 @@ const END: u8 = 0xd9;
 const SAMPLES: u8 = 0xda;
 const TABLES: u8 = 0xc4;
 
-/// The Huffman tables of ISO/IEC 10918-1, K.3: class, counts and values of each.
+/// The Huffman tables of ISO/IEC 10918-1, K.3, each with its class, counts and values.
 const STANDARD: &[u8; 416] =
     b"\x00\x00\x01\x05\x01\x01\x01\x01\x01\x01\x00\x00\x00\x00\x00\x00\x00\x00\x01\x02\x03\x04\
       \x05\x06\x07\x08\x09\x0a\x0b\x10\x00\x02\x01\x03\x03\x02\x04\x03\x05\x05\x04\x04\x00\x00\
@@ -45,12 +45,14 @@ const STANDARD: &[u8; 416] =
 /// The images of a stream.
 #[derive(Default)]
 struct Images {
-    /// An image began inside the one before, which was cut.
+    /// Whether the start of the next image was already read, because the image before it was cut
+    /// short.
     begun: bool,
 }
 
 impl Decoder for Images {
-    /// The next image, cut if the stream ends in it. Bytes between images are passed over.
+    /// The next image, which is cut short if the stream ends within it. Bytes between images are
+    /// skipped.
     fn next(&mut self, input: &mut dyn BufRead, _: Vec<u8>) -> Result<Option<Encoded>, Broken> {
         let Some(start) = self.start(input)? else {
             return Ok(None);
@@ -87,8 +89,8 @@ impl Images {
         Ok(None)
     }
 
-    /// Appends an image, segment by segment, because a preview inside one ends as images do. Its
-    /// start ends with the first byte of a marker.
+    /// Appends an image segment by segment, because a preview inside a segment has an end marker
+    /// too. `bytes` ends with the first byte of a marker.
     fn jpeg(&mut self, input: &mut dyn BufRead, bytes: &mut Vec<u8>) -> IoResult<()> {
         let mut marker = next_marker(input)?;
         while let Some(found) = marker {
@@ -122,7 +124,7 @@ fn one(input: &mut dyn BufRead) -> IoResult<Option<u8>> {
     input.bytes().next().transpose()
 }
 
-/// The next marker, after any number of bytes that fill up.
+/// The next marker, after any number of fill bytes.
 fn next_marker(input: &mut dyn BufRead) -> IoResult<Option<u8>> {
     loop {
         match one(input)? {
@@ -140,7 +142,7 @@ fn samples(input: &mut dyn BufRead, bytes: &mut Vec<u8>) -> IoResult<Option<u8>>
             return Ok(None);
         }
         match next_marker(input)? {
-            // A sample of 255, or a point where decoders can start again.
+            // An escaped sample of 255, or a restart marker.
             Some(sample @ (0 | 0xd0..=0xd7)) => bytes.push(sample),
             marker => return Ok(marker),
         }
@@ -166,7 +168,7 @@ fn png(input: &mut dyn BufRead, bytes: &mut Vec<u8>) -> IoResult<()> {
     }
 }
 
-/// A JPEG image with the standard tables, unless it has its own.
+/// Adds the standard tables to a JPEG image that has none.
 pub(super) fn with_tables(mut bytes: Vec<u8>) -> Vec<u8> {
     let mut at = 2;
     while let Some(&[0xff, marker, high, low]) = bytes.get(at..).and_then(<[u8]>::first_chunk) {

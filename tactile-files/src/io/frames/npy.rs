@@ -1,7 +1,7 @@
-//! Frames that NumPy wrote: arrays in `.npy` files and in `.npz` archives.
+//! Frames in NumPy arrays, from `.npy` files and `.npz` archives.
 //!
-//! A reader of its own: those that exist find an archive's arrays from its end, where a pipe cannot
-//! go, and bring a parser of Python's literals for a header of three fields.
+//! The reader is our own. Existing ones start at the end of an archive, which a pipe cannot reach,
+//! and bring a parser of Python literals for a header of three fields.
 use super::{Broken, Decoder, Encoded, Format, LONGEST_HEADER, append, is_read, quoted};
 use ::image::{DynamicImage, ImageBuffer};
 use flate2::{Crc, Decompress, FlushDecompress, Status};
@@ -23,12 +23,12 @@ pub(super) const ARCHIVE: Format = Format {
     open: |_| Ok(Box::new(Arrays::new(true))),
 };
 
-/// The arrays of a stream, one after the other.
+/// The arrays of a stream in order.
 struct Arrays {
     archived: bool,
     member: Member,
     layout: Option<Layout>,
-    /// Frames of the array that were not read yet.
+    /// Number of frames of the array that were not read yet.
     left: usize,
     found_any: bool,
 }
@@ -56,12 +56,12 @@ impl Arrays {
 }
 
 impl Decoder for Arrays {
-    /// Arrays of an archive that hold other numbers are passed over.
+    /// Arrays of other number types in an archive are skipped.
     fn next(&mut self, input: &mut dyn BufRead, _: Vec<u8>) -> Result<Option<Encoded>, Broken> {
         while self.left == 0 {
             if self.archived {
                 if self.layout.take().is_some() {
-                    // What ends the array is read with its checksum.
+                    // Reads the end of the compressed array, which checks its sum.
                     copy(&mut self.source(input).take(1), &mut sink())?;
                 }
                 self.member.end(input)?;
@@ -100,7 +100,7 @@ impl Decoder for Arrays {
     }
 }
 
-/// How the frames of an array lie in it.
+/// Layout of the frames in an array.
 #[derive(Clone, Copy)]
 struct Layout {
     frames: usize,
@@ -121,7 +121,7 @@ impl Layout {
         let mut start = [0; 8];
         input.read_exact(&mut start)?;
         let mut length = [0; 4];
-        // The length of a header has two bytes in the first version and four in later ones.
+        // The length of the header takes two bytes in version 1 and four in later versions.
         let digits = if start[6] == 1 { 2 } else { 4 };
         input.read_exact(&mut length[..digits])?;
         let length = u64::from(u32::from_le_bytes(length));
@@ -162,7 +162,7 @@ impl Layout {
         is_read(columns, rows).then_some(layout)
     }
 
-    /// Bytes of a frame.
+    /// Size of a frame in bytes.
     fn bytes(&self) -> usize {
         self.rows * self.columns * self.channels * (1 + usize::from(self.wide))
     }
@@ -191,7 +191,7 @@ impl Layout {
     }
 }
 
-/// Kind of the numbers, whether columns come first, and shape, of an array's header.
+/// Number type, whether the order is by columns, and shape, from the header of an array.
 pub(crate) fn header_fields(header: &str) -> Option<(&str, bool, Vec<usize>)> {
     let after = |key: &str| Some(header.split_once(key)?.1.trim_start());
     let kind = after("'descr':")?.strip_prefix('\'')?.split('\'').next()?;
@@ -202,8 +202,8 @@ pub(crate) fn header_fields(header: &str) -> Option<(&str, bool, Vec<usize>)> {
     Some((kind, fortran, sides.ok()?))
 }
 
-/// Names and contents of the files of an archive, of at most so many bytes together. `None` for one
-/// that cannot be read.
+/// Names and contents of the files of an archive, at most `most` bytes together. `None` if the
+/// archive cannot be read.
 pub(crate) fn members(mut input: &[u8], mut most: u64) -> Option<Vec<(String, Vec<u8>)>> {
     let mut files = Vec::new();
     while let Some(mut member) = Member::open(&mut input).ok()? {
@@ -224,20 +224,20 @@ pub(crate) fn members(mut input: &[u8], mut most: u64) -> Option<Vec<(String, Ve
 #[derive(Default)]
 struct Member {
     name: String,
-    /// Bytes in the archive that were not read yet.
+    /// Number of bytes in the archive that were not read yet.
     left: u64,
     inflate: Option<Decompress>,
     sum: Crc,
     announced_sum: u32,
-    /// Whether all was read, so that the sums can be compared.
+    /// Whether all bytes were read, so that the checksum can be compared.
     ended: bool,
 }
 
 impl Member {
-    /// The next file. None where the list of the files begins, which stands behind them.
+    /// The next file. `None` at the archive's directory, which follows the files.
     fn open(input: &mut dyn BufRead) -> Result<Option<Self>, Broken> {
         const FILE: &[u8] = b"PK\x03\x04";
-        /// Sizes that stand in the extra field, in 64 bits.
+        /// Marks a size that stands in the extra field, in 64 bits.
         const ELSEWHERE: u64 = u32::MAX as u64;
         let mut start = Vec::new();
         append(input, 4, &mut start)?;
@@ -262,7 +262,8 @@ impl Member {
         append(input, (number(22, 2) + number(24, 2)) as usize, &mut names)?;
         let mut left = number(14, 4);
         if left == ELSEWHERE {
-            // The field of 64-bit sizes: its kind 1, its length, the size, the size in the archive.
+            // The extra field of 64-bit sizes holds its kind (1), its length, the size and the
+            // packed size.
             let mut extra = names.get(number(22, 2) as usize..).unwrap_or_default();
             left = loop {
                 let Some((head, rest)) = extra.split_at_checked(4) else {
@@ -286,7 +287,7 @@ impl Member {
                 ));
             }
         };
-        // An encrypted file, or one whose size follows it.
+        // The file is encrypted, or its size follows its content.
         if flags & 0b1001 != 0 {
             return Err(Broken::new(
                 "an archive as numpy.savez writes it to a file",
@@ -304,7 +305,7 @@ impl Member {
         }))
     }
 
-    /// Passes over what was not read of the file.
+    /// Skips the unread rest of the file.
     fn end(&mut self, input: &mut dyn BufRead) -> IoResult<()> {
         copy(&mut input.take(self.left), &mut sink())?;
         self.left = 0;
@@ -312,7 +313,7 @@ impl Member {
     }
 }
 
-/// What a file of an archive holds.
+/// The content of a file in an archive.
 struct Source<'a> {
     input: &'a mut dyn BufRead,
     member: &'a mut Member,

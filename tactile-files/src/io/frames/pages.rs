@@ -1,4 +1,4 @@
-//! TIFF files, a frame a page, and single images of any format that is decoded.
+//! TIFF files with one frame per page, and single images of any format that can be decoded.
 use super::super::files::LARGEST_FILE;
 use super::super::kinds::{kind_of, kind_of_text};
 use super::{Broken, Decoder, Encoded, Format, LONGEST_HEADER, frame_formats, quoted};
@@ -17,14 +17,14 @@ pub(super) const FORMAT: Format = Format {
     },
 };
 
-/// Whatever has no format of its own: an image, or what is refused.
+/// All other streams: a single image, or a kind of file that is refused.
 pub(super) const OTHERS: Format = Format {
     name: "single images",
     begins: |_| true,
     open: |input| {
         let bytes = whole(input)?;
         if ::image::guess_format(&bytes).is_ok_and(|format| format.reading_enabled()) {
-            // Anymaps in text and of other kinds: the decoder reads the first.
+            // Of several PNM images in text form the decoder would read only the first.
             let (start, rest) = bytes.split_at(bytes.len().min(8));
             if start.starts_with(b"P") && rest.windows(8).any(|next| next == start) {
                 return Err(Broken::new("one image", "several: write binary PGM or PPM"));
@@ -53,7 +53,7 @@ fn whole(input: &mut dyn BufRead) -> IoResult<Vec<u8>> {
     Ok(bytes)
 }
 
-/// One image, until it is taken.
+/// One image. Empty after it was returned.
 struct Single(Vec<u8>);
 
 impl Decoder for Single {
@@ -65,19 +65,20 @@ impl Decoder for Single {
 
 /// The pages of a TIFF file.
 struct Pages {
-    /// Shared with the page that was turned last, and changed in place when that is done with.
+    /// Shared with the last page, and changed in place if that page was dropped.
     bytes: Arc<Vec<u8>>,
     little_endian: bool,
-    /// Where the directory of the next page stands.
+    /// Offset of the directory of the next page.
     next: usize,
-    /// Directories that were read: a chain that returns to one of them would never end.
+    /// Offsets of the directories that were read. A chain that returns to one of them would never
+    /// end.
     seen: HashSet<usize>,
-    /// The number of frames that ImageJ states. Of a large stack it writes one directory.
+    /// The number of frames that ImageJ states. It writes only one directory for a large stack.
     announced: usize,
 }
 
 impl Pages {
-    /// None where the bytes are no TIFF of 32-bit offsets.
+    /// `None` if the bytes are not a TIFF file with 32-bit offsets.
     fn of(bytes: Vec<u8>) -> Option<Self> {
         let little_endian = match bytes.get(..4)? {
             b"II*\0" => true,
@@ -102,7 +103,7 @@ impl Pages {
         Some(pages)
     }
 
-    /// A whole number of so many bytes.
+    /// A whole number that is stored in `bytes` bytes.
     fn number(&self, at: usize, bytes: usize) -> Option<usize> {
         let mut digits = self.bytes.get(at..at.checked_add(bytes)?)?.to_vec();
         if self.little_endian {
@@ -111,10 +112,10 @@ impl Pages {
         Some((digits.iter()).fold(0, |sum, digit| 256 * sum + usize::from(*digit)))
     }
 
-    /// The file with the next page as its first, which is the one that decoders of images read.
+    /// The file with its next page as the first one, which decoders of images read.
     fn turn(&mut self) -> Option<Arc<Vec<u8>>> {
         let page = self.next;
-        // The first directory is the decoder's to judge, wherever it stands.
+        // The first directory is read from any offset. The decoder refuses a wrong one.
         if !self.seen.is_empty() && page == 0 || !self.seen.insert(page) {
             return None;
         }

@@ -13,18 +13,18 @@ pub(super) const FORMAT: Format = Format {
     },
 };
 
-/// What the header of a YUV4MPEG2 video states.
+/// The header of a YUV4MPEG2 video.
 struct Video {
     columns: usize,
     rows: usize,
     depth: u32,
-    /// Bytes of the planes after the luma.
+    /// Size in bytes of the planes after the luma.
     chroma_bytes: usize,
     rate_hz: Option<f64>,
 }
 
 impl Video {
-    /// The header, or the part of it that cannot be used.
+    /// The parsed header, or a description of the part that cannot be used.
     fn parse(header: &[u8]) -> Result<Self, String> {
         let text = String::from_utf8_lossy(header);
         let Some(text) = text.strip_suffix('\n') else {
@@ -59,7 +59,7 @@ impl Video {
         let found = known.iter().find(|(name, _)| space.starts_with(name));
         let (name, chroma) = found.ok_or_else(unknown)?;
         let depth = match space[name.len()..].trim_start_matches('p') {
-            // How the colours of 8 bits are placed.
+            // These words give the position of 8-bit chroma samples.
             "" | "jpeg" | "mpeg2" | "aldv" => 8,
             digits => digits.parse().map_err(|_| unknown())?,
         };
@@ -83,7 +83,8 @@ impl Video {
         if self.depth > 8 { 2 } else { 1 }
     }
 
-    /// The luma as a PGM, whose header states the bits: one rule for deep samples of all formats.
+    /// The luma as a PGM, whose header states the bits, so that one rule scales the deep samples of
+    /// all formats.
     fn anymap(&self, luma: &[u8]) -> Vec<u8> {
         let largest = (1_u32 << self.depth) - 1;
         let header = format!("P5\n{} {}\n{largest}\n", self.columns, self.rows);
@@ -131,7 +132,7 @@ impl Decoder for Video {
     }
 }
 
-/// A line with its end, without one where the stream ends or the line is too long.
+/// A line with its line break. The break is missing if the stream ends or the line is too long.
 fn line(input: &mut dyn BufRead) -> IoResult<Vec<u8>> {
     let mut line = Vec::new();
     input.take(LONGEST_HEADER).read_until(b'\n', &mut line)?;
