@@ -3,8 +3,7 @@
 
 use crate::study::Study;
 use tactile_imaging::force::{
-    CalibrationOptions, CalibrationPair, ForceMeter, ForceOptions, ForceWorkspace,
-    LinearCalibration, ReferenceFrame,
+    CalibrationPair, ForceMeter, ForceOptions, ForceWorkspace, LinearCalibration, ReferenceFrame,
 };
 use tactile_simulate::{
     CalibrationRun as SimulatedRun, Camera, PressLoad, PressOptions, PressScene,
@@ -32,8 +31,7 @@ pub(crate) fn frame(study: &mut Study) {
         .iter()
         .map(|p| CalibrationPair::loading(p.integrated_pixel_value, p.force_n))
         .collect();
-    let calibration =
-        LinearCalibration::fit(&pairs, &CalibrationOptions::default()).expect("enough pairs");
+    let calibration = LinearCalibration::fit(&pairs).expect("enough pairs");
     let reference = ReferenceFrame::new(scene.reference(0).view()).expect("a frame");
     let frames: Vec<_> = (0..SEEDS).map(|seed| scene.frame(0, seed)).collect();
     let truth = scene.truth(0);

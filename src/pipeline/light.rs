@@ -2,8 +2,8 @@
 use super::contact::{ContactReading, ContactStage, FrameContact, resize};
 use super::error::PipelineError;
 use crate::force::{
-    CalibrationOptions, CalibrationPair, ForceError, ForceMeter, ForceOptions, ForceWorkspace,
-    LensGeometry, LinearCalibration, LocalCalibration, Polarity, ReferenceFrame, StressCalibration,
+    CalibrationPair, ForceError, ForceMeter, ForceOptions, ForceWorkspace, LensGeometry,
+    LinearCalibration, LocalCalibration, Polarity, ReferenceFrame, StressCalibration,
 };
 use nalgebra::{Matrix3, Vector3};
 use ndarray::ArrayView2;
@@ -14,7 +14,7 @@ use std::sync::Arc;
 ///
 /// ```
 /// use tactile_imaging::force::{
-///     CalibrationOptions, CalibrationPair, Estimate, ForceOptions, LinearCalibration,
+///     CalibrationPair, Estimate, ForceOptions, LinearCalibration,
 /// };
 /// use tactile_imaging::pipeline::{LightContact, Object, Pipeline};
 /// let hertz = |peak: f64| {
@@ -26,7 +26,7 @@ use std::sync::Arc;
 /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
 /// let line = LightContact::from_pairs(&pairs, [50e-6; 2])?;
 /// // The same stage, with the contact radius from the mask instead of a fit.
-/// let calibration = LinearCalibration::fit(&pairs, &CalibrationOptions::default())?;
+/// let calibration = LinearCalibration::fit(&pairs)?;
 /// let options = ForceOptions::default().without_profile();
 /// let quick = LightContact::new(calibration, [50e-6; 2], &options)?;
 /// // No calibration: a gauge is enough for force, contact and modulus.
@@ -82,8 +82,7 @@ impl LightContact {
         pixel_size_m: [f64; 2],
         options: &ForceOptions,
     ) -> Result<Self, PipelineError> {
-        let calibration = LinearCalibration::fit(pairs, &CalibrationOptions::default())
-            .map_err(PipelineError::Calibration)?;
+        let calibration = LinearCalibration::fit(pairs).map_err(PipelineError::Calibration)?;
         Ok(Self {
             calibration_bend: bend_of(pairs),
             ..Self::new(calibration, pixel_size_m, options)?
@@ -144,8 +143,7 @@ impl LightContact {
     pub fn gauged(pixel_size_m: [f64; 2], options: &ForceOptions) -> Result<Self, PipelineError> {
         // Contact, radius and centroid do not depend on the calibration, so any line will do.
         let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(n, n));
-        let any = LinearCalibration::fit(&pairs, &CalibrationOptions::default())
-            .map_err(PipelineError::Calibration)?;
+        let any = LinearCalibration::fit(&pairs).map_err(PipelineError::Calibration)?;
         Ok(Self {
             force_from: ForceFrom::Gauge,
             ..Self::new(any, pixel_size_m, options)?
@@ -198,9 +196,9 @@ impl ContactStage for LightContact {
         contact.background_step_grey = force
             .contact
             .is_none()
-            .then_some(force.statistics.sum as f64 / pixels);
+            .then_some(force.difference_sum as f64 / pixels);
         if contact.reading.is_some()
-            && let Some((region, mask)) = workspace.detector.mask()
+            && let Some((region, mask)) = workspace.mask()
         {
             contact.region = Some(region);
             resize(&mut contact.mask, mask.dim());

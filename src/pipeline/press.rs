@@ -12,7 +12,7 @@ use super::stages::{MatchedPoints, Scratch, Stages};
 use super::strain::PairStrain;
 use super::surface::{ContactSurface, ControlPoints};
 use crate::elasticity::modulus::{LoadSeries, ModulusEstimate};
-use crate::force::{Estimate, ReferenceFrame, background_shift};
+use crate::force::{Estimate, ReferenceFrame};
 use crate::matching::Matching;
 use nalgebra::Point3;
 use ndarray::{Array2, ArrayView2, CowArray, Ix2};
@@ -392,8 +392,7 @@ impl<'a> Press<'a> {
             return Ok(*reading);
         }
         let image = self.image(frame)?;
-        let reference = self.stages.reference.image();
-        Err(match background_shift(image.view(), reference) {
+        Err(match self.stages.reference.background_shift(image.view()) {
             Some(grey) => PipelineError::OppositeSignal { frame, grey },
             None => PipelineError::NoContact { frame },
         })

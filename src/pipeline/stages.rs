@@ -13,10 +13,7 @@ use crate::elasticity::field::mean_strain_error;
 use crate::elasticity::modulus::{
     Estimate, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator, Warning,
 };
-use crate::force::{
-    FaceReading, FaceWorkspace, ForceWorkspace, ReferenceFrame, Source, Uncertain,
-    background_shift, median_shift_outside,
-};
+use crate::force::{FaceReading, ForceWorkspace, ReferenceFrame, Source, Uncertain};
 use crate::matching::{MatchedPairs, Matching, WarmStart};
 use crate::tps::{Pairs, SeriesMemory};
 use nalgebra::{Matrix3, Point3};
@@ -43,7 +40,6 @@ pub(super) struct Stages {
 #[derive(Default)]
 pub(super) struct Scratch {
     pub force: ForceWorkspace,
-    face: FaceWorkspace,
     surface: ContactSurfaceWorkspace,
     strain: StrainWorkspace,
     pub report: Report,
@@ -98,7 +94,7 @@ impl Stages {
             if contact.background_step_grey.is_none()
                 && let Some(bounds) = contact.bounds()
             {
-                let step = median_shift_outside(image, self.reference.image(), bounds);
+                let step = self.reference.median_shift_outside(image, bounds);
                 // A twentieth of a grey level is half a per cent of a dim background, and noise
                 // exceeds five standard errors once in a million frames.
                 let limit = |step: Estimate| 0.05_f64.max(5.0 * step.standard_error);
@@ -109,7 +105,7 @@ impl Stages {
                 contact.background_step_grey = step.map(beyond);
             }
             if let Specimen::Flat(_) = self.specimen {
-                let face = self.face(&mut scratch.face, image, contact);
+                let face = self.face(image, contact);
                 if let Some(reading) = &mut contact.reading {
                     reading.face = face;
                     if let Some(face) = face.filter(FaceReading::has_edge) {
@@ -215,7 +211,7 @@ impl Stages {
         let reference = self.reference.image();
         let Some(reading) = &contact.reading else {
             let sign = f64::from(self.contact.polarity().sign());
-            let shift = background_shift(image, reference);
+            let shift = self.reference.background_shift(image);
             let caution = shift.map(|grey| match grey * sign < 0.0 {
                 true => Flag::OppositeSignal { frame, grey },
                 // The light that was corrected, or a contact too faint or too small to be detected.
@@ -268,16 +264,11 @@ impl Stages {
     }
 
     /// The contact as a flat face.
-    fn face(
-        &self,
-        workspace: &mut FaceWorkspace,
-        image: ArrayView2<'_, u8>,
-        contact: &FrameContact,
-    ) -> Option<FaceReading> {
+    fn face(&self, image: ArrayView2<'_, u8>, contact: &FrameContact) -> Option<FaceReading> {
         let (reading, region) = (contact.reading.as_ref()?, contact.region?);
         let images = [image, self.reference.image()];
         let (polarity, size) = (self.contact.polarity(), self.contact.pixel_size_m());
-        let mut face = workspace.measure(images, region, contact.mask.view(), polarity, size)?;
+        let mut face = FaceReading::measure(images, region, contact.mask.view(), polarity, size)?;
         if let Some(lens) = self.contact.lens() {
             // With a distorting lens the pixels differ in size.
             let pixel_m2 = size[0] * size[1];

@@ -15,8 +15,7 @@ use tactile_files::sensor::{
     SensorError,
 };
 use tactile_imaging::force::{
-    Branch, CalibrationOptions, CalibrationPair, LinearCalibration, LocalCalibration,
-    StressCalibration,
+    Branch, CalibrationPair, LinearCalibration, LocalCalibration, StressCalibration,
 };
 
 /// Calibrate a sensor from frames of presses, or fit the line from pixel value to force
@@ -118,8 +117,7 @@ impl PairLine {
         if let Some(reason) = doubt_of_pairs(&pairs) {
             return Err(Failure::in_file(path, reason));
         }
-        let line = LinearCalibration::fit(&pairs, &CalibrationOptions::default())
-            .map_err(|error| Failure::in_file(path, error))?;
+        let line = LinearCalibration::fit(&pairs).map_err(|error| Failure::in_file(path, error))?;
         Ok(Self { pairs, line })
     }
 

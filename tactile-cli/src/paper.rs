@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 use std::error::Error;
 use std::time::Instant;
 use tactile_imaging::Pipeline;
-use tactile_imaging::force::{CalibrationOptions, CalibrationPair, LinearCalibration};
+use tactile_imaging::force::{CalibrationPair, LinearCalibration};
 use tactile_imaging::matching::labelling::Compatibility;
 use tactile_imaging::matching::{AnnealedSoftassign, PointMatcher, RelaxationLabelling};
 use tactile_imaging::optics::{SensorParameters, SensorSpecification, acceptance_angle, led_cone};
@@ -162,7 +162,7 @@ fn flat_tip(seed: u64) -> Found<Experiment> {
     let mut pairs = vec![CalibrationPair::loading(sum(scene.reference(1)), 0.0)];
     pairs.extend(up.chain(down));
     pairs.push(CalibrationPair::unloading(sum(scene.reference(2)), 0.0));
-    let line = LinearCalibration::fit(&pairs, &CalibrationOptions::default())?;
+    let line = LinearCalibration::fit(&pairs)?;
     let report = line.report();
     let loop_percent = loop_percent(&line);
     let departure_percent = 100.0 * report.linearity_error;
@@ -481,7 +481,7 @@ fn labelling(trial: &Trial, dense: bool) -> Found<Experiment> {
 fn specification(trial: &Trial) -> Found<Experiment> {
     let simulation = &trial.simulation;
     let pipeline = trial.pipeline()?;
-    let line = LinearCalibration::fit(&trial.pairs, &CalibrationOptions::default())?;
+    let line = LinearCalibration::fit(&trial.pairs)?;
     let second = trial.scene.reference(1);
     let squares = second.iter().zip(&simulation.reference).map(|(&a, &b)| {
         let difference = f64::from(a) - f64::from(b);

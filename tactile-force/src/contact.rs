@@ -1,6 +1,6 @@
 //! Contact detection against the noise, and the sums over a contact.
 //!
-//! A frame is first tested in one pass ([`FrameStatistics`]). A contact is suspected if a pixel, or
+//! A frame is first tested in one pass. A contact is suspected if a pixel, or
 //! a tile of 8 × 32 pixels, differs from the reference by more than its noise permits at the stated
 //! false-alarm rate *per frame*. Only there a mask is computed: smoothing if the contact is faint,
 //! threshold, selection of the largest component, filling of its holes. Sums run over the mask
@@ -10,7 +10,6 @@
 use ndarray::{ArrayView2, Axis, Slice};
 use tactile_core::{BoundingBox, Estimate, Polarity, Requirement};
 
-use crate::calibration::GreyHistogram;
 use crate::drift::{self, DriftCorrection, FitWorkspace, IlluminationDrift};
 use crate::error::ForceError;
 use crate::frame::{FrameStatistics, PassWorkspace, ReferenceFrame};
@@ -27,21 +26,23 @@ const MARGIN_PX: usize = 4;
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_force::{ContactDetector, ContactOptions, Detection, ReferenceFrame};
+/// use tactile_force::{Contact, ForceMeter, ReferenceFrame};
 ///
 /// let mut frame = Array2::from_elem((64, 64), 12_u8);
 /// let reference = ReferenceFrame::new(frame.view())?;
 /// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(90);
 /// frame[[30, 30]] = 255;
-/// let found: Detection = ContactDetector::new(ContactOptions::default())
-///     .detect_with(&mut Default::default(), frame.view(), &reference)?;
-/// let contact = found.contact.expect("contact");
+/// let meter = ForceMeter::new([20e-6; 2], &Default::default())?;
+/// let contact: Contact = meter
+///     .detect_with(&mut Default::default(), frame.view(), &reference)?
+///     .expect("contact");
 /// assert_eq!((contact.area_px, contact.peak, contact.touches_edge), (400, 243.0, false));
 /// assert_eq!(contact.saturated_px, 1);
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct Contact {
     /// Box around the mask.
     pub bounding_box: BoundingBox,
@@ -68,22 +69,8 @@ pub struct Contact {
 }
 
 /// The result of detection in one frame.
-///
-/// ```
-/// use ndarray::Array2;
-/// use tactile_force::{ContactDetector, ContactOptions, Detection, ReferenceFrame};
-///
-/// let at_rest = Array2::from_elem((64, 64), 12_u8);
-/// let reference = ReferenceFrame::new(at_rest.view())?;
-/// let found: Detection = ContactDetector::new(ContactOptions::default())
-///     .detect_with(&mut Default::default(), at_rest.view(), &reference)?;
-/// assert!(found.contact.is_none() && found.noise.is_none());
-/// assert_eq!(found.statistics.sum, 0);
-/// # Ok::<(), tactile_force::ForceError>(())
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Detection {
+pub(crate) struct Detection {
     /// Sums over the whole frame.
     pub statistics: FrameStatistics,
     /// The correction of illumination and stray light.
@@ -188,26 +175,8 @@ mod read {
 }
 
 /// Buffers that detection reuses from frame to frame.
-///
-/// ```
-/// use ndarray::Array2;
-/// use tactile_force::{
-///     ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame,
-/// };
-///
-/// let mut frame = Array2::from_elem((64, 64), 12_u8);
-/// let reference = ReferenceFrame::new(frame.view())?;
-/// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(90);
-/// frame.slice_mut(ndarray::s![28..32, 28..32]).fill(12); // a hole, which is filled
-/// let mut workspace = DetectorWorkspace::default();
-/// let _: Detection = ContactDetector::new(ContactOptions::default())
-///     .detect_with(&mut workspace, frame.view(), &reference)?;
-/// let (_, mask) = workspace.mask().expect("contact");
-/// assert_eq!(mask.iter().filter(|inside| **inside == 1).count(), 400);
-/// # Ok::<(), tactile_force::ForceError>(())
-/// ```
 #[derive(Clone, Debug, Default)]
-pub struct DetectorWorkspace {
+pub(crate) struct DetectorWorkspace {
     pass: PassWorkspace,
     pub(crate) region: Region,
     noise: NoiseWorkspace,
@@ -216,89 +185,22 @@ pub struct DetectorWorkspace {
     drift: FitWorkspace,
 }
 
-impl DetectorWorkspace {
-    /// The mask of the last frame's contact (1 inside, 0 outside) over a region, with the position
-    /// of the region in the frame. `None` if there was no contact.
-    pub fn mask(&self) -> Option<(BoundingBox, ArrayView2<'_, u8>)> {
-        let place = self.region.place?;
-        let view =
-            ArrayView2::from_shape((place.rows(), place.columns()), &self.region.pixels).ok()?;
-        Some((place, view))
-    }
-
-    /// The grey histogram of the last frame's contact over its aperture, with `pixel_area_m2` per
-    /// pixel: a row in the fit of a [`PressureCurve`](crate::PressureCurve). `None` if there was no
-    /// contact.
-    ///
-    /// ```
-    /// use ndarray::Array2;
-    /// use tactile_force::{
-    ///     ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame,
-    /// };
-    ///
-    /// let mut frame = Array2::from_elem((64, 64), 12_u8);
-    /// let reference = ReferenceFrame::new(frame.view())?;
-    /// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(90);
-    /// let mut workspace = DetectorWorkspace::default();
-    /// let found: Detection = ContactDetector::new(ContactOptions::default()).detect_with(
-    ///     &mut workspace,
-    ///     frame.view(),
-    ///     &reference,
-    /// )?;
-    /// let histogram = workspace.grey_histogram(4e-10).expect("a contact");
-    /// let sum = found.contact.expect("a contact").integrated_pixel_value.value;
-    /// assert!((histogram.integral(|grey| grey) / (4e-10 * sum) - 1.0).abs() < 1e-12);
-    /// # Ok::<(), tactile_force::ForceError>(())
-    /// ```
-    pub fn grey_histogram(&self, pixel_area_m2: f64) -> Option<GreyHistogram> {
-        self.region.place?;
-        let columns = self.region.columns();
-        let runs = self.region.aperture.iter();
-        let differences = runs.flat_map(|run| &self.region.difference[run.span(columns)]);
-        Some(GreyHistogram::from_differences(
-            differences.copied(),
-            pixel_area_m2,
-        ))
-    }
-}
-
 /// Components with fewer pixels are noise.
 const MINIMUM_AREA_PX: usize = 4;
 
 /// Finds the contact in frames of one sensor.
-///
-/// ```
-/// use ndarray::Array2;
-/// use tactile_force::{ContactDetector, ContactOptions, DetectorWorkspace, ReferenceFrame};
-///
-/// let reference = ReferenceFrame::new(Array2::from_elem((64, 64), 10).view())?;
-/// let mut frame = Array2::from_elem((64, 64), 10);
-/// frame.slice_mut(ndarray::s![20..30, 30..44]).fill(90);
-/// let detector = ContactDetector::new(ContactOptions::default());
-/// let mut workspace = DetectorWorkspace::default();
-/// let found = detector.detect_with(&mut workspace, frame.view(), &reference)?;
-/// let contact = found.contact.expect("a bright patch");
-/// assert_eq!(contact.area_px, 140);
-/// assert_eq!(contact.centroid_px[0].value, 36.5);
-/// # Ok::<(), tactile_force::ForceError>(())
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContactDetector {
-    options: ContactOptions,
+pub(crate) struct ContactDetector {
+    pub(crate) options: ContactOptions,
 }
 
 impl ContactDetector {
-    /// Creates a detector with these options.
-    pub fn new(options: ContactOptions) -> Self {
-        Self { options }
-    }
-
     /// The statistics of the frame and its contact. The contact is `None` if there is none.
     ///
     /// # Errors
     /// An error if the size of the frame differs from that of the reference, or if too much of the
     /// contact is saturated.
-    pub fn detect_with(
+    pub(crate) fn detect_with(
         &self,
         workspace: &mut DetectorWorkspace,
         frame: ArrayView2<'_, u8>,

@@ -2,8 +2,6 @@
 //! contact.
 
 use nalgebra::{Matrix3, Vector3};
-use ndarray::{ArrayView2, Axis, AxisDescription, Slice};
-use tactile_core::{BoundingBox, Estimate};
 
 use crate::tiles::{TILE_COLUMNS, TILE_ROWS, TileSum};
 
@@ -26,22 +24,36 @@ const BOTH: f64 = 16.0;
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_force::{
-///     ContactDetector, ContactOptions, Detection, DriftCorrection, ReferenceFrame,
-/// };
+/// use tactile_force::*;
 ///
-/// // Three grey levels of uniform stray light are not a contact.
-/// let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 20_u8).view())?;
-/// let brighter = Array2::from_elem((160, 160), 23_u8);
-/// let options = ContactOptions::default().with_drift(DriftCorrection::Offset);
-/// let found: Detection = ContactDetector::new(options).detect_with(
-///     &mut Default::default(),
-///     brighter.view(),
-///     &reference,
-/// )?;
-/// assert!(found.contact.is_none());
-/// assert!((found.drift.coefficients[0] - 3.0).abs() < 1e-9);
-/// # Ok::<(), tactile_force::ForceError>(())
+/// /// One newton per million grey levels.
+/// struct Line;
+///
+/// impl StressCalibration for Line {
+///     fn force_n(&self, integrated_pixel_value: f64) -> f64 {
+///         1e-6 * integrated_pixel_value
+///     }
+/// }
+///
+/// let drift = |correction, at_rest: u8, now: u8| -> Result<IlluminationDrift, ForceError> {
+///     let [reference, frame] = [at_rest, now].map(|grey| Array2::from_elem((160, 160), grey));
+///     let contact = ContactOptions::default().with_drift(correction);
+///     let options = ForceOptions::default().with_contact(contact);
+///     let m = measure_force(frame.view(), reference.view(), [20e-6; 2], &Line, &options)?;
+///     assert!(m.contact.is_none(), "a change of light is not a contact");
+///     Ok(m.drift)
+/// };
+/// // Three grey levels of uniform stray light, and illumination that is a tenth brighter.
+/// let stray = drift(DriftCorrection::Offset, 20, 23)?;
+/// assert!((stray.coefficients[0] - 3.0).abs() < 1e-9);
+/// let brighter = drift(DriftCorrection::Illumination, 100, 110)?;
+/// assert!((brighter.coefficients[0] - 1.1).abs() < 1e-9);
+/// let automatic = drift(DriftCorrection::Automatic, 100, 103)?;
+/// assert_eq!((automatic.outcome, automatic.tiles), (DriftOutcome::Corrected, 20 * 5));
+/// // A black background reveals nothing about the illumination.
+/// let black = drift(DriftCorrection::Automatic, 0, 0)?;
+/// assert!(matches!(black.outcome, DriftOutcome::TooDark { .. }));
+/// # Ok::<(), ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -66,31 +78,7 @@ pub enum DriftCorrection {
     Automatic,
 }
 
-/// Whether the drift of a frame is known.
-///
-/// ```
-/// use ndarray::Array2;
-/// use tactile_force::{
-///     ContactDetector, ContactOptions, Detection, DriftCorrection, DriftOutcome, ForceError,
-///     ReferenceFrame,
-/// };
-///
-/// let options = ContactOptions::default().with_drift(DriftCorrection::Automatic);
-/// let outcome = |at_rest: u8, now: u8| -> Result<DriftOutcome, ForceError> {
-///     let reference = ReferenceFrame::new(Array2::from_elem((160, 160), at_rest).view())?;
-///     let frame = Array2::from_elem((160, 160), now);
-///     let found: Detection = ContactDetector::new(options).detect_with(
-///         &mut Default::default(),
-///         frame.view(),
-///         &reference,
-///     )?;
-///     Ok(found.drift.outcome)
-/// };
-/// assert_eq!(outcome(100, 103)?, DriftOutcome::Corrected);
-/// // A black background reveals nothing about the illumination.
-/// assert!(matches!(outcome(0, 0)?, DriftOutcome::TooDark { .. }));
-/// # Ok::<(), ForceError>(())
-/// ```
+/// Whether the drift of a frame is known. See [`DriftCorrection`] for an example.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -138,29 +126,11 @@ impl DriftCorrection {
 }
 
 /// The drift found in one frame. `coefficients` are [value, per column, per row] relative to the
-/// centre of the frame: grey levels for stray light, relative values for illumination.
-///
-/// ```
-/// use ndarray::Array2;
-/// use tactile_force::{
-///     ContactDetector, ContactOptions, Detection, DriftCorrection, ReferenceFrame,
-/// };
-///
-/// // Illumination that is a tenth brighter.
-/// let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 100_u8).view())?;
-/// let brighter = Array2::from_elem((160, 160), 110_u8);
-/// let options = ContactOptions::default().with_drift(DriftCorrection::Illumination);
-/// let found: Detection = ContactDetector::new(options).detect_with(
-///     &mut Default::default(),
-///     brighter.view(),
-///     &reference,
-/// )?;
-/// assert!((found.drift.coefficients[0] - 1.1).abs() < 1e-9);
-/// assert_eq!(found.drift.tiles, 20 * 5);
-/// # Ok::<(), tactile_force::ForceError>(())
-/// ```
+/// centre of the frame: grey levels for stray light, relative values for illumination. See
+/// [`DriftCorrection`] for an example.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct IlluminationDrift {
     /// The correction that was applied.
     pub correction: DriftCorrection,
@@ -577,130 +547,6 @@ pub(crate) fn median(values: &[f64], scratch: &mut Vec<f64>) -> f64 {
     scratch.clear();
     scratch.extend_from_slice(values);
     *scratch.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
-/// Difference of the light in a frame without contact from that in the reference, in grey levels:
-/// the mean over the block of 8 × 8 pixels where it is largest. The last blocks end at the edge of
-/// the frame.
-///
-/// `None` for a difference of up to 4 grey levels, which may be noise, and for images that differ
-/// in size. A larger difference means that the light has changed, or that frame and reference were
-/// swapped. O(pixels).
-///
-/// ```
-/// use ndarray::Array2;
-/// use tactile_force::background_shift;
-///
-/// let reference = Array2::from_elem((40, 50), 90_u8);
-/// let mut frame = Array2::from_elem((40, 50), 88_u8);
-/// assert_eq!(background_shift(frame.view(), reference.view()), None);
-/// frame.slice_mut(ndarray::s![8..24, 16..32]).fill(20);
-/// assert_eq!(background_shift(frame.view(), reference.view()), Some(-70.0));
-/// // A band of two columns at the right edge, in a block of eight.
-/// let mut frame = reference.clone();
-/// frame.slice_mut(ndarray::s![.., 48..]).fill(50);
-/// assert_eq!(background_shift(frame.view(), reference.view()), Some(-10.0));
-/// ```
-#[must_use]
-pub fn background_shift(frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) -> Option<f64> {
-    if frame.dim() != reference.dim() || frame.is_empty() {
-        return None;
-    }
-    // Smaller than measurable contacts, and large enough to average noise.
-    let side = |length: usize| length.min(8);
-    let (height, width) = (side(frame.nrows()), side(frame.ncols()));
-    let starts = |length: usize| {
-        (0..length)
-            .step_by(8)
-            .map(move |s| s.min(length - side(length)))
-    };
-    let blocks = starts(frame.nrows()).flat_map(|row| starts(frame.ncols()).map(move |c| [row, c]));
-    let shift = blocks
-        .map(|[row, column]| {
-            let sides = [row..row + height, column..column + width].map(Slice::from);
-            let part = |along: AxisDescription| sides[along.axis.index()];
-            let (block, reference) = (frame.slice_each_axis(part), reference.slice_each_axis(part));
-            let both = block.iter().zip(reference);
-            let sum: i32 = both.map(|(&f, &r)| i32::from(f) - i32::from(r)).sum();
-            f64::from(sum) / block.len() as f64
-        })
-        .max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
-    (shift.abs() > 4.0).then_some(shift)
-}
-
-/// The median of frame minus reference outside the box of a contact, in grey levels, from about 24
-/// rows, with its standard error.
-///
-/// Integer grey levels are treated as distributed uniformly over their width, so that a change of a
-/// fraction of a level is detected. `None` for fewer than 100 pixels and for images that differ in
-/// size. A mean would be affected by the surroundings of the contact: a dent in a dark sensor is
-/// wider than the contact. O(examined rows).
-///
-/// ```
-/// use ndarray::Array2;
-/// use tactile_force::{BoundingBox, median_shift_outside};
-///
-/// let reference = Array2::from_elem((40, 50), 90_u8);
-/// // A fifth of the pixels is two levels darker, the others one.
-/// let mut frame =
-///     Array2::from_shape_fn((40, 50), |(r, c)| if (r + c) % 5 == 0 { 88 } else { 89 });
-/// frame.slice_mut(ndarray::s![8..24, 16..32]).fill(20);
-/// let contact = BoundingBox { row_start: 8, row_end: 24, column_start: 16, column_end: 32 };
-/// let shift = median_shift_outside(frame.view(), reference.view(), contact).expect("a frame");
-/// assert!((shift.value + 1.12).abs() < 0.02 && shift.standard_error < 0.02);
-/// let whole = BoundingBox::whole(frame.dim());
-/// assert_eq!(median_shift_outside(frame.view(), reference.view(), whole), None);
-/// ```
-#[must_use]
-pub fn median_shift_outside(
-    frame: ArrayView2<'_, u8>,
-    reference: ArrayView2<'_, u8>,
-    contact: BoundingBox,
-) -> Option<Estimate> {
-    if frame.dim() != reference.dim() {
-        return None;
-    }
-    let mut counts = [0_usize; 511];
-    let mut total = 0;
-    let (rows, columns) = frame.dim();
-    for row in (0..rows).step_by(rows / 24 + 1) {
-        let is_beside = (contact.row_start..contact.row_end).contains(&row);
-        let spans = if is_beside {
-            [0..contact.column_start, contact.column_end..columns]
-        } else {
-            [0..columns, 0..0]
-        };
-        for span in spans {
-            total += span.len();
-            let [frame, reference] = [frame, reference].map(|image| {
-                let row = image.index_axis_move(Axis(0), row);
-                row.slice_axis_move(Axis(0), Slice::from(span.clone()))
-            });
-            for (&f, &r) in frame.iter().zip(reference) {
-                counts[usize::from(255 + u16::from(f) - u16::from(r))] += 1;
-            }
-        }
-    }
-    if total < 100 {
-        return None;
-    }
-    let quantile = |share: f64| {
-        let wanted = share * total as f64;
-        let mut below = 0.0;
-        for (index, count) in counts.iter().enumerate() {
-            let count = *count as f64;
-            if count > 0.0 && below + count >= wanted {
-                return index as f64 - 255.5 + (wanted - below) / count;
-            }
-            below += count;
-        }
-        255.0
-    };
-    // The quartiles of a normal variable are 1.349 standard deviations apart, and the median of
-    // many values has 1.253 times the error of their mean.
-    let sd = (quantile(0.75) - quantile(0.25)) / 1.349;
-    let error = 1.253 * sd / (total as f64).sqrt();
-    Some(Estimate::new(quantile(0.5), error))
 }
 
 #[cfg(test)]

@@ -10,10 +10,12 @@ use thiserror::Error;
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_force::{ForceError, ReferenceFrame};
+/// use tactile_force::{ForceError, ForceMeter, ReferenceFrame};
 ///
 /// let reference = ReferenceFrame::new(Array2::zeros((40, 50)).view())?;
-/// let error = reference.compare(Array2::zeros((50, 40)).view(), 10).unwrap_err();
+/// let meter = ForceMeter::new([20e-6; 2], &Default::default())?;
+/// let frame = Array2::zeros((50, 40));
+/// let error = meter.detect_with(&mut Default::default(), frame.view(), &reference).unwrap_err();
 /// assert_eq!(error, ForceError::SizeMismatch { expected: (40, 50), found: (50, 40) });
 /// # Ok::<(), ForceError>(())
 /// ```

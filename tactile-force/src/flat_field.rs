@@ -9,31 +9,11 @@ use crate::tiles::TileSum;
 ///
 /// If stray light reaches the camera through the same lens as the signal, the reference contains
 /// the vignetting of both.
-///
-/// ```
-/// use ndarray::Array2;
-/// use tactile_force::ReferenceFrame;
-///
-/// // Darker towards the corners, by a fifth.
-/// let image = Array2::from_shape_fn((240, 320), |(y, x)| {
-///     let (u, v) = ((x as f64 - 159.5) / 159.5, (y as f64 - 119.5) / 119.5);
-///     (200.0 * (1.0 - 0.1 * (u * u + v * v))).round() as u8
-/// });
-/// let flat = ReferenceFrame::new(image.view())?
-///     .with_flat_field()?
-///     .flat_field()
-///     .expect("asked for");
-/// // L = Σ c_k (1, u, v, u², uv, v²)_k: 0.8 in the corner u = v = −1.
-/// let [c, u, v, uu, uv, vv] = flat.coefficients;
-/// assert!((c - u - v + uu + uv + vv - 0.8).abs() < 3e-3 && c == 1.0);
-/// # Ok::<(), tactile_force::ForceError>(())
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct FlatField {
+pub(crate) struct FlatField {
     /// Coefficients of 1, u, v, u², uv, v², with u and v from −1 to 1 over the frame. The first is
     /// 1.
-    pub coefficients: [f64; 6],
+    coefficients: [f64; 6],
     middle: [f64; 2],
     /// Covariance of the unscaled coefficients, divided by the square of the first.
     covariance: [[f64; 6]; 6],

@@ -285,6 +285,7 @@ pub struct DotPair {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct LensFit {
     /// The geometry.
     pub geometry: LensGeometry,

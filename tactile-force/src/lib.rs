@@ -15,7 +15,7 @@
 //! | `contact` | detection, mask, aperture, sums over the aperture |
 //! | `profile` | the contact radius from the pressure profile |
 //! | `calibration` | pixel value to force and stress, (5) and (6): a line, a local curve f |
-//! | `measure`, `batch` | the force of one frame; of many |
+//! | `measure` | the force of one frame |
 //! | `shear` | (9) to (12) |
 //! | `lens` | pixels to metres: sizes along x and y, radial distortion, fit to a dot target |
 //!
@@ -52,24 +52,19 @@ mod shear;
 mod tiles;
 
 pub use calibration::{
-    Branch, CalibrationFrame, CalibrationOptions, CalibrationPair, CurveHysteresis, ForceReading,
-    GreyHistogram, Hysteresis, LineReport, LinearCalibration, LocalCalibration, PressureCurve,
+    Branch, CalibrationFrame, CalibrationPair, CurveHysteresis, ForceReading, GreyHistogram,
+    Hysteresis, LineReport, LinearCalibration, LocalCalibration, PressureCurve,
     PressureCurveOptions, PressureCurveReport, StressCalibration,
 };
-pub use contact::{Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace};
-pub use drift::{
-    DriftCorrection, DriftOutcome, IlluminationDrift, background_shift, median_shift_outside,
-};
+pub use contact::{Contact, ContactOptions};
+pub use drift::{DriftCorrection, DriftOutcome, IlluminationDrift};
 pub use error::ForceError;
-pub use face::{FaceReading, FaceWorkspace, ShapeProblem};
-pub use flat_field::FlatField;
-pub use frame::{FrameStatistics, ReferenceFrame};
+pub use face::{FaceReading, ShapeProblem};
+pub use frame::ReferenceFrame;
 pub use lens::{DotPair, LensFit, LensGeometry};
 pub use measure::{ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, measure_force};
 pub use noise::{DifferenceNoise, NoiseModel};
 pub use profile::{HertzFit, ProfileShape};
 pub use shear::{ShearCalibration, ShearMeasurement, ShearPair, ShearTracker};
-pub use tactile_core::{
-    BoundingBox, CustomError, Estimate, InvalidOption, Polarity, Source, StopReason, Uncertain,
-};
+pub use tactile_core::{BoundingBox, Estimate, Polarity, Source, StopReason, Uncertain};
 pub use {nalgebra, ndarray};

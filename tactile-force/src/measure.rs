@@ -7,7 +7,7 @@ use crate::calibration::{ForceReading, GreyHistogram, LocalCalibration, StressCa
 use crate::contact::{Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace};
 use crate::drift::IlluminationDrift;
 use crate::error::ForceError;
-use crate::frame::{FrameStatistics, ReferenceFrame};
+use crate::frame::ReferenceFrame;
 use crate::lens::LensGeometry;
 use crate::noise::DifferenceNoise;
 use crate::profile::{HertzFit, HertzFitter, PixelVariance, Rings, Start, VARIANCE_LEVELS};
@@ -23,7 +23,7 @@ use crate::runs::Run;
 /// };
 ///
 /// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
-/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let calibration = LinearCalibration::fit(&pairs)?;
 /// let mut frame = Array2::from_elem((64, 64), 12_u8);
 /// let reference = ReferenceFrame::new(frame.view())?;
 /// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(112);
@@ -52,7 +52,9 @@ impl ForceMeter {
     /// An error for a pixel size that is not positive and finite.
     pub fn new(pixel_size_m: [f64; 2], options: &ForceOptions) -> Result<Self, ForceError> {
         Ok(Self {
-            detector: ContactDetector::new(options.contact),
+            detector: ContactDetector {
+                options: options.contact,
+            },
             fitter: HertzFitter::new(),
             skip_profile: options.skip_profile,
             lens: LensGeometry::new(pixel_size_m)?,
@@ -89,6 +91,37 @@ impl ForceMeter {
     pub fn without_profile(mut self) -> Self {
         self.skip_profile = true;
         self
+    }
+
+    /// Finds the contact of one frame without measuring its force. `None` if there is none.
+    ///
+    /// # Errors
+    /// Those of [`measure_with`](Self::measure_with).
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_force::{ForceMeter, ForceWorkspace, ReferenceFrame};
+    ///
+    /// let reference = ReferenceFrame::new(Array2::from_elem((64, 64), 10).view())?;
+    /// let mut frame = Array2::from_elem((64, 64), 10);
+    /// frame.slice_mut(ndarray::s![20..30, 30..44]).fill(90);
+    /// let (meter, mut workspace) =
+    ///     (ForceMeter::new([20e-6; 2], &Default::default())?, ForceWorkspace::default());
+    /// let contact = meter.detect_with(&mut workspace, frame.view(), &reference)?;
+    /// let contact = contact.expect("a bright patch");
+    /// assert_eq!((contact.area_px, contact.centroid_px[0].value), (140, 36.5));
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
+    pub fn detect_with(
+        &self,
+        workspace: &mut ForceWorkspace,
+        frame: ArrayView2<'_, u8>,
+        reference: &ReferenceFrame,
+    ) -> Result<Option<Contact>, ForceError> {
+        workspace.local.clear();
+        let detector = &mut workspace.detector;
+        let found = self.detector.detect_with(detector, frame, reference)?;
+        Ok(found.contact)
     }
 
     /// Measures one frame. A calibration with a [local curve](StressCalibration::local) converts
@@ -260,7 +293,7 @@ struct PixelSize {
 /// let pairs: Vec<_> = (0..5)
 ///     .map(|k| CalibrationPair::loading(1e5 * k as f64, 0.5 * k as f64))
 ///     .collect();
-/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let calibration = LinearCalibration::fit(&pairs)?;
 /// let reference = Array2::from_elem((200, 200), 12_u8);
 /// let frame = Array2::from_shape_fn((200, 200), |(y, x)| {
 ///     let r2 = (x as f64 - 90.3).powi(2) + (y as f64 - 104.8).powi(2);
@@ -340,7 +373,7 @@ impl ForceOptions {
 /// use tactile_force::{CalibrationPair, ForceMeasurement, LinearCalibration, measure_force};
 ///
 /// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
-/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let calibration = LinearCalibration::fit(&pairs)?;
 /// let at_rest = Array2::from_elem((64, 64), 12_u8);
 /// let m: ForceMeasurement = measure_force(
 ///     at_rest.view(),
@@ -355,6 +388,7 @@ impl ForceOptions {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct ForceMeasurement {
     /// Normal force in newtons, equation (6). Zero without contact.
     pub force_n: Uncertain,
@@ -381,8 +415,8 @@ pub struct ForceMeasurement {
     /// 0.5 % and the effect of pixel discretisation. Possible reasons are misstated pixel sizes, a
     /// distorting lens, or an object that is not round.
     pub elongation: Option<f64>,
-    /// Sums over the whole frame.
-    pub statistics: FrameStatistics,
+    /// Σ (frame − reference) over the whole frame, in grey levels.
+    pub difference_sum: i64,
     /// The correction of illumination and stray light.
     pub drift: IlluminationDrift,
     /// The noise from which the errors are computed. `None` without contact.
@@ -402,7 +436,7 @@ impl ForceMeasurement {
             mean_stress_pa: None,
             peak_stress_pa: None,
             elongation: None,
-            statistics: found.statistics,
+            difference_sum: found.statistics.sum,
             drift: found.drift,
             noise: None,
         }
@@ -419,27 +453,67 @@ impl ForceMeasurement {
 /// };
 ///
 /// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
-/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let calibration = LinearCalibration::fit(&pairs)?;
 /// let mut frame = Array2::from_elem((64, 64), 12_u8);
 /// let reference = ReferenceFrame::new(frame.view())?;
 /// frame.slice_mut(ndarray::s![20..40, 24..48]).fill(90);
 /// let mut workspace = ForceWorkspace::default();
 /// let meter = ForceMeter::new([20e-6; 2], &Default::default())?;
 /// meter.measure_with(&mut workspace, frame.view(), &reference, &calibration)?;
-/// let (place, mask) = workspace.detector.mask().expect("contact");
+/// let (place, mask) = workspace.mask().expect("contact");
 /// assert_eq!(mask.iter().filter(|inside| **inside == 1).count(), 20 * 24);
 /// assert!(place.row_start <= 20 && place.row_end >= 40);
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct ForceWorkspace {
-    /// Data of the last frame in the detector: mask, grey histogram and background.
-    pub detector: DetectorWorkspace,
+    detector: DetectorWorkspace,
     rings: Rings,
     local: Local,
 }
 
 impl ForceWorkspace {
+    /// The mask of the last frame's contact (1 inside, 0 outside) over a region, with the position
+    /// of the region in the frame. `None` if there was no contact.
+    pub fn mask(&self) -> Option<(BoundingBox, ArrayView2<'_, u8>)> {
+        let region = &self.detector.region;
+        let place = region.place?;
+        let view = ArrayView2::from_shape((place.rows(), place.columns()), &region.pixels).ok()?;
+        Some((place, view))
+    }
+
+    /// The grey histogram of the contact found last by [`ForceMeter::detect_with`], over its
+    /// aperture, with `pixel_area_m2` per pixel: a row in the fit of a
+    /// [`PressureCurve`](crate::PressureCurve). `None` if there was no contact, or if its grey
+    /// levels were converted into pressures.
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_force::{ForceMeter, ForceWorkspace, ReferenceFrame};
+    ///
+    /// let mut frame = Array2::from_elem((64, 64), 12_u8);
+    /// let reference = ReferenceFrame::new(frame.view())?;
+    /// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(90);
+    /// let (meter, mut workspace) =
+    ///     (ForceMeter::new([20e-6; 2], &Default::default())?, ForceWorkspace::default());
+    /// let contact = meter.detect_with(&mut workspace, frame.view(), &reference)?;
+    /// let histogram = workspace.grey_histogram(4e-10).expect("a contact");
+    /// let sum = contact.expect("a contact").integrated_pixel_value.value;
+    /// assert!((histogram.integral(|grey| grey) / (4e-10 * sum) - 1.0).abs() < 1e-12);
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
+    pub fn grey_histogram(&self, pixel_area_m2: f64) -> Option<GreyHistogram> {
+        let region = &self.detector.region;
+        region.place.filter(|_| self.local.converted.is_none())?;
+        let columns = region.columns();
+        let runs = region.aperture.iter();
+        let differences = runs.flat_map(|run| &region.difference[run.span(columns)]);
+        Some(GreyHistogram::from_differences(
+            differences.copied(),
+            pixel_area_m2,
+        ))
+    }
+
     /// The pressure of the last contact in pascals over its region (zero outside the aperture), and
     /// the position of the region in the frame. `None` without contact, or if the calibration had
     /// no [local curve](crate::StressCalibration::local). O(pixels of the region).

@@ -25,6 +25,7 @@ use crate::error::ForceError;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct NoiseModel {
     /// Variance at grey level zero, in squared grey levels. At least 1/12.
     pub read_variance: f64,
@@ -38,12 +39,14 @@ pub struct NoiseModel {
 /// ```
 /// use tactile_force::DifferenceNoise;
 ///
-/// let noise = DifferenceNoise { gain: 0.02, ..DifferenceNoise::white(4.0) };
+/// let mut noise = DifferenceNoise::white(4.0);
+/// noise.gain = 0.02;
 /// // The variance of a pixel that is 100 grey levels brighter in a contact.
 /// assert_eq!(noise.background + noise.gain * 100.0, 6.0);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct DifferenceNoise {
     /// Variance outside contacts, of frame and reference together.
     pub background: f64,

@@ -39,6 +39,7 @@ pub struct ShearPair {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct ShearCalibration {
     /// [K_x, K_y] in newtons per metre.
     pub stiffness_n_per_m: [Estimate; 2],
@@ -47,6 +48,23 @@ pub struct ShearCalibration {
 }
 
 impl ShearCalibration {
+    /// Stiffnesses [K_x, K_y] that are known from elsewhere, in newtons per metre.
+    ///
+    /// ```
+    /// use tactile_force::{Estimate, ShearCalibration};
+    ///
+    /// let calibration = ShearCalibration::new([Estimate::new(2e3, 10.0), Estimate::new(3e3, 10.0)]);
+    /// let [x, _] = calibration.force_n([Estimate::exact(1e-5); 2]);
+    /// assert!((x.value - 0.02).abs() < 1e-12);
+    /// ```
+    #[must_use]
+    pub const fn new(stiffness_n_per_m: [Estimate; 2]) -> Self {
+        Self {
+            stiffness_n_per_m,
+            residual_sd_n: [0.0; 2],
+        }
+    }
+
     /// Least-squares fit through the origin, separately for each axis: K = Σ u F / Σ u².
     ///
     /// # Errors
@@ -70,8 +88,8 @@ impl ShearCalibration {
         }
         let [(k_x, sd_x), (k_y, sd_y)] = [stiffness(pairs, 0)?, stiffness(pairs, 1)?];
         Ok(Self {
-            stiffness_n_per_m: [k_x, k_y],
             residual_sd_n: [sd_x, sd_y],
+            ..Self::new([k_x, k_y])
         })
     }
 
@@ -110,23 +128,10 @@ fn stiffness(pairs: &[ShearPair], axis: usize) -> Result<(Estimate, f64), ForceE
 
 /// Shear force and centroid displacement of one frame.
 ///
-/// ```
-/// use tactile_force::{Estimate, ShearMeasurement};
-///
-/// let along = |measured: &ShearMeasurement| {
-///     let [x, y] = measured.force_n.map(|f| f.value);
-///     x.hypot(y)
-/// };
-/// let at_rest = [Estimate::default(); 2];
-/// let pulled = ShearMeasurement {
-///     displacement_m: at_rest,
-///     step_m: at_rest,
-///     force_n: [0.3, 0.4].map(|value| Estimate::new(value, 0.01)),
-/// };
-/// assert_eq!(along(&pulled), 0.5);
-/// ```
+/// See [`ShearTracker`] for an example.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct ShearMeasurement {
     /// Current centroid minus centroid at the start of the contact, [x, y] in metres.
     pub displacement_m: [Estimate; 2],
@@ -153,10 +158,8 @@ pub struct ShearMeasurement {
 ///         12 + (150.0 * (1.0 - r2 / 400.0).max(0.0).sqrt()).round() as u8
 ///     })
 /// };
-/// let force = LinearCalibration::fit(
-///     &[0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v)),
-///     &Default::default(),
-/// )?;
+/// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
+/// let force = LinearCalibration::fit(&pairs)?;
 /// let shear = ShearCalibration::fit(&[1e-5, 2e-5].map(|u| ShearPair {
 ///     centroid_step_m: [u, u],
 ///     force_n: [2e3 * u; 2],

@@ -228,14 +228,12 @@ impl CalibrationRun {
     /// The force that determines the light.
     fn lit_force_n(&self, branch: Branch, force_n: f64) -> f64 {
         let x = force_n / self.largest_force_n;
-        match branch {
-            Branch::Loading => force_n,
-            Branch::Unloading => {
-                // The parabola vanishes at both ends, where the branches meet, and is largest in
-                // the middle.
-                force_n + 4.0 * self.hysteresis * self.largest_force_n * x * (1.0 - x)
-            }
+        if branch == Branch::Loading {
+            return force_n;
         }
+        // The parabola vanishes at both ends, where the branches meet, and is largest in the
+        // middle.
+        force_n + 4.0 * self.hysteresis * self.largest_force_n * x * (1.0 - x)
     }
 
     fn validate(&self) -> Result<(), SimulateError> {

@@ -8,9 +8,7 @@ use proptest::prelude::*;
 use std::fmt::Write;
 use tactile_files::io::{read_columns, read_grid, read_points};
 use tactile_files::scene::Scene;
-use tactile_imaging::force::{
-    CalibrationOptions, CalibrationPair, LinearCalibration, StressCalibration,
-};
+use tactile_imaging::force::{CalibrationPair, LinearCalibration, StressCalibration};
 use tactile_imaging::tps::ThinPlateSpline;
 
 /// A file with the given content.
@@ -104,7 +102,7 @@ fn uses_of_tables(edits: &[Edit]) -> [Option<f64>; 2] {
         let [values, forces] = columns(&mutated(PAIRS, edits), wanted)?;
         let pair = |(&v, &f): (&f64, &f64)| CalibrationPair::loading(v, f);
         let pairs: Vec<_> = values.iter().zip(&forces).map(pair).collect();
-        let line = LinearCalibration::fit(&pairs, &CalibrationOptions::default()).ok()?;
+        let line = LinearCalibration::fit(&pairs).ok()?;
         Some(line.force_n(line.range()[0]))
     };
     [spline(), line()]

@@ -11,7 +11,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::fem::{Guide, GuideLayer, Interface, Material};
-use tactile_imaging::force::{CalibrationOptions, LinearCalibration, StressCalibration};
+use tactile_imaging::force::{LinearCalibration, StressCalibration};
 use tactile_imaging::inclusion::{
     FaceCells, InclusionEstimate, InclusionSearch, PressureProfile, Progress, RingMeans, Scan,
     ScanPress, TissueBlock, asymmetry_warnings, ring_means,
@@ -315,7 +315,7 @@ impl InclusionScene {
         };
         let unusable = |reason| FileError::field(&self.file, "calibration.pairs", reason);
         let pairs = force_pairs(path).map_err(|error| unusable(error.into()))?;
-        let line = LinearCalibration::fit(&pairs, &CalibrationOptions::default())
+        let line = LinearCalibration::fit(&pairs)
             .map_err(|error| unusable(Box::<dyn Error + Send + Sync>::from(error)))?;
         let slope = line.force_n(1.0) - line.force_n(0.0);
         if slope > 0.0 {

@@ -6,8 +6,7 @@ use super::layers;
 use super::target::find_dots;
 use ndarray::{Array2, ArrayView2};
 use tactile_imaging::force::{
-    CalibrationFrame, ContactDetector, ContactOptions, Detection, DetectorWorkspace,
-    DriftCorrection, ForceError, ForceMeter, ForceWorkspace, LensFit, LensGeometry, PressureCurve,
+    CalibrationFrame, ForceError, ForceMeter, ForceWorkspace, LensFit, LensGeometry, PressureCurve,
     PressureCurveOptions, ReferenceFrame,
 };
 use tactile_imaging::pipeline::ReferenceLight;
@@ -122,23 +121,26 @@ impl SensorCalibration {
         Ok((geometry, Some(fit)))
     }
 
+    fn meter(lens: &LensGeometry) -> Result<ForceMeter, SensorError> {
+        ForceMeter::new(lens.pixel_size_m(), &Sensor::force_options())
+            .map(|meter| meter.with_lens(*lens))
+            .map_err(SensorError::Lens)
+    }
+
     /// The histograms of all presses that show a contact.
     fn contacts(
         &self,
         reference: &ReferenceFrame,
         lens: &LensGeometry,
     ) -> Result<Vec<Seen>, SensorError> {
-        let options = ContactOptions::default().with_drift(DriftCorrection::Automatic);
-        let detector = ContactDetector::new(options);
-        let mut workspace = DetectorWorkspace::default();
+        let meter = Self::meter(lens)?;
+        let mut workspace = ForceWorkspace::default();
         let mut seen = Vec::new();
         for (press, given) in self.presses.iter().enumerate() {
             let failed = |source: ForceError| SensorError::Press { press, source };
-            let found: Detection = detector
-                .detect_with(&mut workspace, given.frame.view(), reference)
-                .map_err(failed)?;
+            let found = meter.detect_with(&mut workspace, given.frame.view(), reference);
             // A press too light to be seen has a row in the findings but is not used for the curve.
-            let Some(contact) = found.contact else {
+            let Some(contact) = found.map_err(failed)? else {
                 continue;
             };
             let centre = contact.centroid_px.map(|c| c.value);
@@ -212,9 +214,7 @@ impl SensorCalibration {
         lens: &LensGeometry,
         curve: &PressureCurve,
     ) -> Result<Vec<PressFinding>, SensorError> {
-        let meter = ForceMeter::new(lens.pixel_size_m(), &Sensor::force_options())
-            .map_err(SensorError::Lens)?
-            .with_lens(*lens);
+        let meter = Self::meter(lens)?;
         let mut workspace = ForceWorkspace::default();
         let mut findings = Vec::with_capacity(self.presses.len());
         for (press, given) in self.presses.iter().enumerate() {

@@ -15,8 +15,8 @@ use tactile_core::statistics::effective_degrees_of_freedom;
 use tactile_core::{Estimate, Requirement};
 
 use super::{
-    Branch, CalibrationOptions, CalibrationPair, ForceReading, GreyHistogram, LinearCalibration,
-    LocalCalibration, StressCalibration,
+    Branch, CalibrationPair, ForceReading, GreyHistogram, LinearCalibration, LocalCalibration,
+    StressCalibration,
 };
 use crate::error::ForceError;
 use crate::noise::DifferenceNoise;
@@ -195,6 +195,7 @@ pub struct PressureCurveReport {
     derive(serde::Serialize, serde::Deserialize),
     serde(deny_unknown_fields)
 )]
+#[non_exhaustive]
 pub struct PressureCurve {
     #[cfg_attr(feature = "serde", serde(deserialize_with = "checked"))]
     coefficients: Coefficients,
@@ -230,9 +231,9 @@ fn checked<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Coefficients, D:
 impl PressureCurve {
     /// Fits the curve to frames under known forces, loading and unloading.
     ///
+    /// # Errors
     /// An error for fewer than five frames, for frames without any force or light, and for light
     /// that decreases with the force.
-    /// force.
     pub fn fit(
         frames: &[CalibrationFrame],
         options: &PressureCurveOptions,
@@ -267,12 +268,11 @@ impl PressureCurve {
             branch: f.branch,
         };
         let pairs: Vec<_> = frames.iter().map(pair).collect();
-        // The curve passes through the origin, and so does the line for the same frames.
-        let through_origin = CalibrationOptions::default().with_zero_at_origin();
         Ok(Self {
             coefficients,
             report,
-            sums: LinearCalibration::fit(&pairs, &through_origin)?,
+            // The curve passes through the origin, and so does the line for the same frames.
+            sums: LinearCalibration::through_origin(&pairs)?,
         })
     }
 }

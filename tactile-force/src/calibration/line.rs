@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 use tactile_core::Estimate;
 
-use super::{Branch, CalibrationOptions, CalibrationPair, StressCalibration};
+use super::{Branch, CalibrationPair, StressCalibration};
 use crate::error::ForceError;
 
 /// A straight line from integrated pixel value to force, F = b + s V, or F = s V through the
@@ -12,7 +12,7 @@ use crate::error::ForceError;
 /// ```
 /// use tactile_force::{CalibrationPair, LinearCalibration, StressCalibration};
 /// let pairs = [0.0, 1.0, 2.0, 3.0, 4.0].map(|k| CalibrationPair::loading(1e5 * k, 0.5 * k));
-/// let line = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let line = LinearCalibration::fit(&pairs)?;
 /// assert!((line.force_n(2.5e5) - 1.25).abs() < 1e-12);
 /// assert!((line.sensitivity_n(1e5) - 5e-6).abs() < 1e-17);
 /// assert_eq!(line.range(), [0.0, 4e5]);
@@ -41,16 +41,36 @@ impl LinearCalibration {
     /// # Errors
     /// An error for fewer than one pair more than parameters, for a pair that is not finite, and
     /// for pairs at a single pixel value.
-    pub fn fit(
-        pairs: &[CalibrationPair],
-        options: &CalibrationOptions,
-    ) -> Result<Self, ForceError> {
-        let columns = if options.through_origin { 1 } else { 2 };
+    pub fn fit(pairs: &[CalibrationPair]) -> Result<Self, ForceError> {
+        Self::fitted(pairs, false)
+    }
+
+    /// Fits a line with zero force at zero pixel value.
+    ///
+    /// # Errors
+    /// Those of [`fit`](Self::fit).
+    ///
+    /// ```
+    /// use tactile_force::{CalibrationPair, LinearCalibration, StressCalibration};
+    ///
+    /// let pairs = [1.0, 2.0, 3.0].map(|v| CalibrationPair::loading(v, 2.0 * v + 0.1));
+    /// let line = LinearCalibration::through_origin(&pairs)?;
+    /// assert_eq!(line.force_n(0.0), 0.0);
+    /// // Between the slopes of the last and of the first pair.
+    /// assert!((2.0 + 0.1 / 3.0..2.1).contains(&line.sensitivity_n(1.0)));
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
+    pub fn through_origin(pairs: &[CalibrationPair]) -> Result<Self, ForceError> {
+        Self::fitted(pairs, true)
+    }
+
+    fn fitted(pairs: &[CalibrationPair], through_origin: bool) -> Result<Self, ForceError> {
+        let columns = if through_origin { 1 } else { 2 };
         check_pairs(pairs, columns)?;
         let values: Vec<f64> = pairs.iter().map(|p| p.integrated_pixel_value).collect();
         let forces: Vec<f64> = pairs.iter().map(|p| p.force_n).collect();
         // Centring and scaling of the pixel values decorrelate the two parameters.
-        let centre = if options.through_origin {
+        let centre = if through_origin {
             0.0
         } else {
             values.iter().sum::<f64>() / values.len() as f64
@@ -62,7 +82,7 @@ impl LinearCalibration {
             return Err(ForceError::DegeneratePairs { span: scale });
         }
         let x: Vec<f64> = values.iter().map(|v| (v - centre) / scale).collect();
-        let fit = Fit::weighted(&x, &forces, options)
+        let fit = Fit::weighted(&x, &forces, through_origin)
             .ok_or(ForceError::DegeneratePairs { span: scale })?;
         let degrees = (pairs.len() - columns) as f64;
         let estimate = |value: f64, variance: f64| {
@@ -72,7 +92,7 @@ impl LinearCalibration {
         let errors = fit.inverse * fit.residual_sd.powi(2);
         let slope_variance = errors[(1, 1)] / (scale * scale);
         let slope_n = estimate(slope / scale, slope_variance);
-        let (level_n, covariance, parameters) = if options.through_origin {
+        let (level_n, covariance, parameters) = if through_origin {
             (Estimate::exact(0.0), 0.0, vec![slope_n])
         } else {
             let (variance, covariance) = (errors[(0, 0)], errors[(0, 1)] / scale);
@@ -107,7 +127,7 @@ impl LinearCalibration {
     /// ```
     /// use tactile_force::{CalibrationPair, LinearCalibration};
     /// let pairs = [0.0, 1.0, 2.0].map(|k| CalibrationPair::loading(1e5 * k, 0.5 * k));
-    /// let line = LinearCalibration::fit(&pairs, &Default::default())?;
+    /// let line = LinearCalibration::fit(&pairs)?;
     /// assert!((line.integrated_pixel_value(0.75).unwrap() - 1.5e5).abs() < 1e-6);
     /// # Ok::<(), tactile_force::ForceError>(())
     /// ```
@@ -176,7 +196,7 @@ fn check_pairs(pairs: &[CalibrationPair], parameters: usize) -> Result<(), Force
 ///     [CalibrationPair::loading(v, 0.1 * v), CalibrationPair::unloading(v, 0.1 * v - 0.01)]
 /// };
 /// let pairs: Vec<_> = (0..11).map(f64::from).flat_map(both).collect();
-/// let line = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let line = LinearCalibration::fit(&pairs)?;
 /// let hysteresis = line.report().hysteresis.expect("both branches");
 /// assert!((hysteresis.mean_n.value - 0.01).abs() < 1e-12);
 /// assert!((hysteresis.share_of_full_scale - 0.01 / 1.01).abs() < 1e-9);
@@ -209,7 +229,7 @@ pub struct Hysteresis {
 ///
 /// let pairs = [(0.0, 0.01), (1e5, 0.49), (2e5, 1.01), (3e5, 1.49)];
 /// let pairs = pairs.map(|(v, f)| CalibrationPair::loading(v, f));
-/// let line = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let line = LinearCalibration::fit(&pairs)?;
 /// let report = line.report();
 /// assert!(report.r_squared > 0.999 && report.monotone);
 /// assert_eq!((report.pairs, report.degrees_of_freedom), (4, 2));
@@ -375,11 +395,11 @@ impl Fit {
     /// largest restricted likelihood is used. Few pairs do not decide between them, so the middle
     /// one is preferred by 0.8 in the log-likelihood. The coverage of its 95 % intervals is then 92
     /// to 98 % in the middle of the range, for each kind of noise.
-    fn weighted(x: &[f64], forces: &[f64], options: &CalibrationOptions) -> Option<Self> {
+    fn weighted(x: &[f64], forces: &[f64], through_origin: bool) -> Option<Self> {
         let largest = forces.iter().fold(0.0, |m: f64, f| m.max(f.abs()));
-        let columns = if options.through_origin { 1 } else { 2 };
+        let columns = if through_origin { 1 } else { 2 };
         let freedom = (x.len() - columns) as f64;
-        let even = Self::solve(x, forces, &vec![1.0; x.len()], options.through_origin)?;
+        let even = Self::solve(x, forces, &vec![1.0; x.len()], through_origin)?;
         if largest == 0.0 {
             return Some(even);
         }
@@ -387,7 +407,7 @@ impl Fit {
         for (growth, prior) in [(0.0, 0.0), (freedom.min(4.0), 0.8), (30.0, 0.0)] {
             let weight = |f: &f64| 1.0 / (1.0 + growth * (f / largest).powi(2));
             let weights: Vec<f64> = forces.iter().map(weight).collect();
-            let fit = Self::solve(x, forces, &weights, options.through_origin)?;
+            let fit = Self::solve(x, forces, &weights, through_origin)?;
             // Pairs without noise leave only rounding, which has no likelihood.
             if fit.residual_sd <= 1e-12 * largest {
                 return Some(even);

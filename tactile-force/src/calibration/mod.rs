@@ -36,7 +36,7 @@ use crate::noise::DifferenceNoise;
 ///
 /// let pairs = [(0.0, 0.01), (1e5, 0.49), (2e5, 1.01), (3e5, 1.49)];
 /// let pairs = pairs.map(|(v, f)| CalibrationPair::loading(v, f));
-/// let line = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let line = LinearCalibration::fit(&pairs)?;
 /// let reading = line.read(Estimate::new(2.5e5, 400.0))?;
 /// let part = |source| reading.force_n.part(source).abs();
 /// assert!(part(Source::Noise) < part(Source::Calibration) && !reading.out_of_range);
@@ -147,7 +147,7 @@ pub trait StressCalibration: Send + Sync {
     /// use tactile_force::{CalibrationPair, Estimate, LinearCalibration, StressCalibration};
     /// let pairs = [(0.0, 0.01), (1e5, 0.48), (2e5, 1.03), (3e5, 1.5), (4e5, 1.98)];
     /// let pairs = pairs.map(|(v, f)| CalibrationPair::loading(v, f));
-    /// let line = LinearCalibration::fit(&pairs, &Default::default())?;
+    /// let line = LinearCalibration::fit(&pairs)?;
     /// let values = [1e5, 3e5].map(|value| Estimate::new(value, 300.0));
     /// let covariance = line.force_covariance_n2(&values);
     /// let alone = line.read(values[1])?.force_n.standard_error();
@@ -433,6 +433,7 @@ impl GreyHistogram {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum Branch {
     /// The force was rising.
     #[default]
@@ -480,35 +481,5 @@ impl CalibrationPair {
             branch: Branch::Unloading,
             ..Self::loading(integrated_pixel_value, force_n)
         }
-    }
-}
-
-/// Options of a calibration fit.
-///
-/// ```
-/// use tactile_force::{
-///     CalibrationOptions, CalibrationPair, LinearCalibration, StressCalibration,
-/// };
-///
-/// let pairs = [1.0, 2.0, 3.0].map(|v| CalibrationPair::loading(v, 2.0 * v + 0.1));
-/// let options = CalibrationOptions::default().with_zero_at_origin();
-/// let line = LinearCalibration::fit(&pairs, &options)?;
-/// assert_eq!(line.force_n(0.0), 0.0);
-/// // Between the slopes of the last and of the first pair.
-/// assert!((2.0 + 0.1 / 3.0..2.1).contains(&line.sensitivity_n(1.0)));
-/// # Ok::<(), tactile_force::ForceError>(())
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct CalibrationOptions {
-    through_origin: bool,
-}
-
-impl CalibrationOptions {
-    /// Forces the line through zero force at zero pixel value.
-    #[must_use]
-    pub fn with_zero_at_origin(mut self) -> Self {
-        self.through_origin = true;
-        self
     }
 }

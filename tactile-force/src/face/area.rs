@@ -44,12 +44,52 @@ fn moments(x: f64, y: f64) -> Vector4<f64> {
     Vector4::new(1.0, x, y, x * x + y * y)
 }
 
-/// Measures flat faces, with buffers reused from frame to frame.
-///
-/// See [`FaceReading`] for an example.
-#[derive(Debug, Default)]
-pub struct FaceWorkspace {
-    /// Frame minus reference around the contact, positive in the contact.
+impl FaceReading {
+    /// The face of a contact, from a frame and its reference, the box of the contact and its pixels
+    /// in the box. `None` if the contact is too small or too irregular to have an interior.
+    ///
+    /// O(pixels of the box). See [`FaceReading`] for an example.
+    pub fn measure(
+        [frame, reference]: [ArrayView2<'_, u8>; 2],
+        region: BoundingBox,
+        mask: ArrayView2<'_, bool>,
+        polarity: Polarity,
+        pixel_size_m: [f64; 2],
+    ) -> Option<Self> {
+        let window = region.grown(MARGIN, frame.dim());
+        let sign = polarity.sign() as f32;
+        // Differences keep their sign, so that noise outside the face cancels in the sum.
+        let signal = Zip::from(window.of(frame))
+            .and(window.of(reference))
+            .map_collect(|&f, &r| sign * (f32::from(f) - f32::from(r)));
+        let part = BoundingBox {
+            row_start: region.row_start - window.row_start,
+            row_end: region.row_end - window.row_start,
+            column_start: region.column_start - window.column_start,
+            column_end: region.column_end - window.column_start,
+        };
+        let inside = inside(signal.view(), part, mask)?;
+        let distance = distance_to_outline(&inside);
+        let near = distance.indexed_iter().filter(|(_, d)| **d < FARTHEST);
+        let (rows, columns) = signal.dim();
+        let mut face = Face {
+            near: near.map(|((row, column), _)| [row, column]).collect(),
+            tiles: Array2::default((rows.div_ceil(TILE), columns.div_ceil(TILE))),
+            signal,
+            inside,
+            distance,
+        };
+        let background = face.background();
+        face.signal.mapv_inplace(|s| s - background as f32);
+        let variance = face.noise_variance();
+        face.average_ring(variance)?;
+        face.sum(pixel_size_m, variance)
+    }
+}
+
+/// The pixels around a contact, and what is summed over them.
+struct Face {
+    /// Frame minus reference, positive in the contact.
     signal: Array2<f32>,
     inside: Array2<bool>,
     distance: Array2<u8>,
@@ -58,81 +98,42 @@ pub struct FaceWorkspace {
     tiles: Array2<Tile>,
 }
 
-impl FaceWorkspace {
-    /// The face of a contact, from a frame and its reference, the box of the contact and its pixels
-    /// in the box. `None` if the contact is too small or too irregular to have an interior.
-    ///
-    /// O(pixels of the box).
-    pub fn measure(
-        &mut self,
-        [frame, reference]: [ArrayView2<'_, u8>; 2],
-        region: BoundingBox,
-        mask: ArrayView2<'_, bool>,
-        polarity: Polarity,
-        pixel_size_m: [f64; 2],
-    ) -> Option<FaceReading> {
-        let window = region.grown(MARGIN, frame.dim());
-        let shape = (window.rows(), window.columns());
-        let sign = polarity.sign() as f32;
-        resize(&mut self.signal, shape);
-        Zip::from(&mut self.signal)
-            .and(window.of(frame))
-            .and(window.of(reference))
-            // Differences keep their sign, so that noise outside the face cancels in the sum.
-            .for_each(|s, &f, &r| *s = sign * (f32::from(f) - f32::from(r)));
-        let part = BoundingBox {
-            row_start: region.row_start - window.row_start,
-            row_end: region.row_end - window.row_start,
-            column_start: region.column_start - window.column_start,
-            column_end: region.column_end - window.column_start,
-        };
-        self.threshold(part, mask)?;
-        resize(&mut self.distance, shape);
-        distance_to_outline(&self.inside, &mut self.distance);
-        self.near.clear();
-        for (row, distances) in self.distance.rows().into_iter().enumerate() {
-            let near = distances.iter().enumerate().filter(|(_, d)| **d < FARTHEST);
-            self.near.extend(near.map(|(column, _)| [row, column]));
-        }
-        let background = self.background();
-        self.signal.mapv_inplace(|s| s - background as f32);
-        let variance = self.noise_variance();
-        self.average_ring(variance)?;
-        self.sum(pixel_size_m, variance)
+/// The inside pixels: brighter than half the lower quartile of the contact's light, which for a
+/// plain face is half of its light. `part` is the contact's box in the signal.
+fn inside(
+    signal: ArrayView2<'_, f32>,
+    part: BoundingBox,
+    mask: ArrayView2<'_, bool>,
+) -> Option<Array2<bool>> {
+    let light = part.of(signal);
+    let mut counts = [0_usize; 511];
+    Zip::from(mask).and(light).for_each(|inside, &light| {
+        counts[(light as i32 + 255) as usize] += usize::from(*inside);
+    });
+    let quarter = counts.iter().sum::<usize>() / 4;
+    let mut below = 0;
+    let quartile = counts.iter().position(|pixels| {
+        below += pixels;
+        below > quarter
+    })?;
+    // The lower quartile is used instead of the mean, because bright spots of a texture would
+    // raise the level above its dark spots.
+    let level = 0.5 * (quartile as f32 - 255.0);
+    if level <= 0.0 {
+        return None;
     }
+    let mut inside = Array2::from_elem(signal.dim(), false);
+    let mut there = inside.view_mut();
+    there.slice_axis_inplace(Axis(0), (part.row_start..part.row_end).into());
+    there.slice_axis_inplace(Axis(1), (part.column_start..part.column_end).into());
+    Zip::from(there)
+        .and(mask)
+        .and(light)
+        .for_each(|inside, mask, &light| *inside = *mask && light > level);
+    Some(inside)
+}
 
-    /// Finds the inside pixels: brighter than half the lower quartile of the contact's light, which
-    /// for a plain face is half of its light.
-    fn threshold(&mut self, part: BoundingBox, mask: ArrayView2<'_, bool>) -> Option<()> {
-        let signal = part.of(self.signal.view());
-        let mut counts = [0_usize; 511];
-        Zip::from(mask).and(signal).for_each(|inside, &signal| {
-            counts[(signal as i32 + 255) as usize] += usize::from(*inside);
-        });
-        let quarter = counts.iter().sum::<usize>() / 4;
-        let mut below = 0;
-        let quartile = counts.iter().position(|pixels| {
-            below += pixels;
-            below > quarter
-        })?;
-        // The lower quartile is used instead of the mean, because bright spots of a texture would
-        // raise the level above its dark spots.
-        let level = 0.5 * (quartile as f32 - 255.0);
-        if level <= 0.0 {
-            return None;
-        }
-        resize(&mut self.inside, self.signal.dim());
-        self.inside.fill(false);
-        let mut inside = self.inside.view_mut();
-        inside.slice_axis_inplace(Axis(0), (part.row_start..part.row_end).into());
-        inside.slice_axis_inplace(Axis(1), (part.column_start..part.column_end).into());
-        Zip::from(inside)
-            .and(mask)
-            .and(signal)
-            .for_each(|inside, mask, &signal| *inside = *mask && signal > level);
-        Some(())
-    }
-
+impl Face {
     /// Mean light a few pixels outside the outline, in excess of the reference.
     fn background(&self) -> f64 {
         let beyond = BAND + 2..=MARGIN as u8 - 1;
@@ -166,12 +167,6 @@ impl FaceWorkspace {
 
     /// Averages the light just inside the outline, around each tile.
     fn average_ring(&mut self, variance: f64) -> Option<()> {
-        let (rows, columns) = self.signal.dim();
-        resize(
-            &mut self.tiles,
-            (rows.div_ceil(TILE), columns.div_ceil(TILE)),
-        );
-        self.tiles.fill(Tile::default());
         let mut all = Vector5::zeros();
         for &at in &self.near {
             let distance = self.distance[at];
@@ -318,15 +313,6 @@ impl FaceWorkspace {
     }
 }
 
-/// Changes the shape of a buffer, reusing its memory if possible.
-fn resize<T: Clone + Default>(array: &mut Array2<T>, shape: (usize, usize)) {
-    if array.dim() != shape {
-        let (mut memory, _) = std::mem::take(array).into_raw_vec_and_offset();
-        memory.resize(shape.0 * shape.1, T::default());
-        *array = Array2::from_shape_vec(shape, memory).unwrap_or_default();
-    }
-}
-
 /// The pixels of a row, contiguous in the buffers.
 fn pixels_of<T>(row: ArrayView1<'_, T>) -> &[T] {
     row.to_slice().unwrap_or_default()
@@ -342,13 +328,9 @@ fn around(tiles: &Array2<Tile>, row: usize, column: usize) -> impl Iterator<Item
 
 /// The chessboard distance of each pixel to the nearest pixel on the other side of the outline, at
 /// most `FARTHEST`, and 1 next to the outline. The image is extended by its last pixels. O(pixels).
-fn distance_to_outline(inside: &Array2<bool>, distance: &mut Array2<u8>) {
-    let [from_outside, from_inside] = [false, true].map(|side| distance_to_side(inside, side));
+fn distance_to_outline(inside: &Array2<bool>) -> Array2<u8> {
     // One of the two is zero.
-    Zip::from(distance)
-        .and(&from_outside)
-        .and(&from_inside)
-        .for_each(|distance, outside, inside| *distance = outside + inside);
+    distance_to_side(inside, false) + distance_to_side(inside, true)
 }
 
 /// The chessboard distance to the nearest pixel on one side, at most `FARTHEST`. With g the
@@ -397,8 +379,7 @@ mod tests {
             let (y, x) = (r as f64 - 14.0, c as f64 - 19.0);
             x.hypot(y) < 11.0 && !(x.abs() < 2.0 && y.abs() < 2.0)
         });
-        let mut found = Array2::zeros(inside.dim());
-        distance_to_outline(&inside, &mut found);
+        let found = distance_to_outline(&inside);
         for ((r, c), &side) in inside.indexed_iter() {
             let others = inside.indexed_iter().filter(|(_, other)| **other != side);
             let nearest = others

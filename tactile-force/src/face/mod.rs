@@ -29,14 +29,13 @@
 
 mod area;
 
-pub use area::FaceWorkspace;
 use tactile_core::Estimate;
 
 /// The contact of a flat face in one frame.
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_force::{BoundingBox, FaceReading, FaceWorkspace, Polarity};
+/// use tactile_force::{BoundingBox, FaceReading, Polarity};
 ///
 /// // A uniform square of 60 × 60 pixels, with its outline between pixels.
 /// let reference = Array2::from_elem((120, 120), 20_u8);
@@ -45,8 +44,7 @@ use tactile_core::Estimate;
 /// let region = BoundingBox { row_start: 28, row_end: 92, column_start: 28, column_end: 92 };
 /// let mask = region.of(frame.view()).mapv(|level| level > 60);
 /// let images = [frame.view(), reference.view()];
-/// let face: FaceReading = FaceWorkspace::default()
-///     .measure(images, region, mask.view(), Polarity::Brighter, [50e-6; 2])
+/// let face = FaceReading::measure(images, region, mask.view(), Polarity::Brighter, [50e-6; 2])
 ///     .expect("a face");
 /// assert!((face.area_m2.value / 9e-6 - 1.0).abs() < 1e-9);
 /// assert!(face.has_edge() && !face.sticks());

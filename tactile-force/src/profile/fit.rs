@@ -16,7 +16,7 @@ use crate::region::Region;
 /// use tactile_force::*;
 ///
 /// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
-/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let calibration = LinearCalibration::fit(&pairs)?;
 /// let at_rest = Array2::from_elem((120, 120), 12_u8);
 /// let shape = |level: &dyn Fn(f64) -> f64| -> Result<Option<ProfileShape>, ForceError> {
 ///     let frame = Array2::from_shape_fn((120, 120), |(y, x)| {
@@ -57,7 +57,7 @@ pub enum ProfileShape {
 /// use tactile_force::*;
 ///
 /// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
-/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let calibration = LinearCalibration::fit(&pairs)?;
 /// let frame = Array2::from_shape_fn((120, 120), |(y, x)| {
 ///     let r = (x as f64 - 60.3).hypot(y as f64 - 57.8) / 30.0;
 ///     12 + (150.0 * (1.0 - r * r).max(0.0).sqrt()).round() as u8
@@ -78,6 +78,7 @@ pub enum ProfileShape {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct HertzFit {
     /// Centre [x, y] in pixels.
     pub centre_px: [Estimate; 2],

@@ -6,7 +6,7 @@ use tactile_force::{CalibrationPair, LinearCalibration};
 /// A line of 1 µN per grey level.
 pub(crate) fn calibration() -> LinearCalibration {
     let pairs = [0.0, 1e5, 2e5, 3e5, 4e5].map(|v| CalibrationPair::loading(v, 1e-6 * v));
-    LinearCalibration::fit(&pairs, &Default::default()).unwrap()
+    LinearCalibration::fit(&pairs).unwrap()
 }
 
 /// Pseudo-random bytes. Equal seeds give equal bytes.

@@ -4,8 +4,8 @@ use proptest::prelude::*;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::{Distribution, Normal};
 use tactile_force::{
-    CalibrationOptions, CalibrationPair, Estimate, ForceError, ForceReading, LinearCalibration,
-    Source, StressCalibration,
+    CalibrationPair, Estimate, ForceError, ForceReading, LinearCalibration, Source,
+    StressCalibration,
 };
 
 type Pairs = Vec<CalibrationPair>;
@@ -32,7 +32,7 @@ fn bent(v: f64) -> f64 {
 }
 
 fn fitted(pairs: &[CalibrationPair]) -> LinearCalibration {
-    LinearCalibration::fit(pairs, &CalibrationOptions::default()).unwrap()
+    LinearCalibration::fit(pairs).unwrap()
 }
 
 #[test]
@@ -52,8 +52,7 @@ fn exact_data_are_recovered_to_rounding() {
     assert!(r.hysteresis.unwrap().greatest_n.abs() < 1e-14);
     assert_eq!(c.range(), [0.0, 4e6]);
     // Through the origin, whatever the pairs are.
-    let options = CalibrationOptions::default().with_zero_at_origin();
-    let forced = LinearCalibration::fit(&cycle(20, 5e-3, 9, line), &options).unwrap();
+    let forced = LinearCalibration::through_origin(&cycle(20, 5e-3, 9, line)).unwrap();
     assert_eq!(forced.force_n(0.0), 0.0);
 }
 
@@ -95,8 +94,7 @@ fn stress_over_the_contact_is_the_force() {
 
 #[test]
 fn bad_pairs_are_refused() {
-    let fit =
-        |pairs: &[CalibrationPair]| LinearCalibration::fit(pairs, &CalibrationOptions::default());
+    let fit = LinearCalibration::fit;
     let good = cycle(5, 0.0, 1, line);
     let mut nan = good.clone();
     nan[3].force_n = f64::NAN;

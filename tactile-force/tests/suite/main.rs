@@ -4,7 +4,6 @@ mod bad_input;
 mod batch;
 mod blob;
 mod calibration;
-mod frame_statistics;
 mod illumination;
 mod lens;
 mod no_allocation;

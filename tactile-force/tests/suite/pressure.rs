@@ -5,9 +5,8 @@
 
 use proptest::prelude::*;
 use tactile_force::{
-    Branch, CalibrationFrame, CalibrationOptions, DriftCorrection, ForceError, GreyHistogram,
-    LinearCalibration, LocalCalibration, PressureCurve, PressureCurveOptions, Source,
-    StressCalibration,
+    Branch, CalibrationFrame, DriftCorrection, ForceError, GreyHistogram, LinearCalibration,
+    LocalCalibration, PressureCurve, PressureCurveOptions, Source, StressCalibration,
 };
 
 use crate::simulated::{AREA_M2, Sensor, contact_radius, measure};
@@ -26,8 +25,7 @@ fn force_and_radius_of_another_ball_are_right_whatever_the_power() {
         let reference = sensor.reference();
         let (frames, pairs) = sensor.calibration(&reference, 1);
         let curve = PressureCurve::fit(&frames, &PressureCurveOptions::default()).unwrap();
-        let options = CalibrationOptions::default().with_zero_at_origin();
-        let sums = LinearCalibration::fit(&pairs, &options).unwrap();
+        let sums = LinearCalibration::through_origin(&pairs).unwrap();
         // The local curve, and the frame sums for comparison: worst relative errors of force and
         // radius.
         let (mut local, mut summed) = ([0.0_f64; 2], [0.0_f64; 2]);

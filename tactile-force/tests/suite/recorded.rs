@@ -9,9 +9,9 @@ use test_support as record;
 
 use ndarray::Array2;
 use tactile_force::{
-    CalibrationOptions, CalibrationPair, ContactOptions, DriftCorrection, Estimate,
-    ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, LinearCalibration, Polarity,
-    ReferenceFrame, ShearCalibration, ShearPair, Source, StressCalibration,
+    CalibrationPair, ContactOptions, DriftCorrection, Estimate, ForceMeasurement, ForceMeter,
+    ForceOptions, ForceWorkspace, LinearCalibration, Polarity, ReferenceFrame, ShearCalibration,
+    ShearPair, Source, StressCalibration,
 };
 
 use crate::blob::{hertz, noise};
@@ -107,9 +107,11 @@ fn calibration(answers: &mut Answers, name: &str, c: &LinearCalibration) {
 }
 
 fn calibrations(answers: &mut Answers) {
-    let options = CalibrationOptions::default();
-    for (origin, options) in [(false, options), (true, options.with_zero_at_origin())] {
-        let line = LinearCalibration::fit(&pairs(), &options).unwrap();
+    for (origin, fit) in [
+        (false, LinearCalibration::fit as fn(&[CalibrationPair]) -> _),
+        (true, LinearCalibration::through_origin),
+    ] {
+        let line: LinearCalibration = fit(&pairs()).unwrap();
         calibration(
             answers,
             &format!("calibration.f64.line.plain.{origin}"),
@@ -120,7 +122,7 @@ fn calibrations(answers: &mut Answers) {
 
 fn measurement(answers: &mut Answers, name: &str, m: &ForceMeasurement) {
     answers.estimate(&format!("{name}.force"), m.force_n.total());
-    answers.add(&format!("{name}.sums"), m.statistics.sum as f64);
+    answers.add(&format!("{name}.sums"), m.difference_sum as f64);
     for c in m.drift.coefficients {
         answers.add(&format!("{name}.drift"), c);
     }
@@ -191,7 +193,7 @@ fn frames(answers: &mut Answers) {
     let faint = frame([98.3, 71.6], 30.0, 4.0, 1.0, 8);
     let brighter = frame([60.1, 80.2], 21.0, 90.0, 1.06, 9);
     let darker = frame([98.3, 71.6], 30.0, -40.0, 1.0, 10);
-    let line = LinearCalibration::fit(&pairs(), &CalibrationOptions::default()).unwrap();
+    let line = LinearCalibration::fit(&pairs()).unwrap();
     let contact = ContactOptions::default().with_drift(DriftCorrection::None);
     let options = || ForceOptions::default().with_contact(contact);
     let drift = |correction| options().with_contact(contact.with_drift(correction));

@@ -5,9 +5,8 @@
 
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use tactile_force::{
-    Branch, CalibrationFrame, ContactDetector, ContactOptions, Detection, DetectorWorkspace,
-    DotPair, DriftCorrection, ForceMeter, ForceOptions, ForceWorkspace, LensFit, PressureCurve,
-    PressureCurveOptions, ProfileShape,
+    Branch, CalibrationFrame, ContactOptions, DotPair, DriftCorrection, ForceMeter, ForceOptions,
+    ForceWorkspace, LensFit, PressureCurve, PressureCurveOptions, ProfileShape,
 };
 
 use crate::simulated::{PIXEL_M, SHAPE, Sensor, contact_radius};
@@ -46,8 +45,11 @@ fn moduli_are_right_with_every_effect_at_once() {
         let mut rng = ChaCha8Rng::seed_from_u64(11);
         let lens = lens(&sensor).geometry;
         let reference = sensor.reference();
-        let detector = ContactDetector::new(contact);
-        let mut workspace = DetectorWorkspace::default();
+        let options = ForceOptions::default().with_contact(contact);
+        let meter = ForceMeter::new(lens.pixel_size_m(), &options)
+            .unwrap()
+            .with_lens(lens);
+        let mut workspace = ForceWorkspace::default();
         let mut frames = Vec::new();
         for k in 0..24_u64 {
             let force = (k % 12 + 1) as f64 / 12.0;
@@ -56,22 +58,16 @@ fn moduli_are_right_with_every_effect_at_once() {
                 90.0 + 25.0 * rng.random::<f64>(),
             ];
             let frame = flickering(sensor, &mut rng).frame(force, 4e-3, place, Branch::Loading, k);
-            let found: Detection = detector
+            let seen = meter
                 .detect_with(&mut workspace, frame.view(), &reference)
+                .unwrap()
                 .unwrap();
-            let seen = found.contact.unwrap();
             let centroid = seen.centroid_px.map(|c| c.value);
             let pixel_area = lens.mean_pixel_area_m2(centroid, seen.equivalent_radius_px);
             let histogram = workspace.grey_histogram(pixel_area).unwrap();
             frames.push(CalibrationFrame::new(histogram, force, Branch::Loading).unwrap());
         }
         let curve = PressureCurve::fit(&frames, &PressureCurveOptions::default()).unwrap();
-        let meter = ForceMeter::new(
-            lens.pixel_size_m(),
-            &ForceOptions::default().with_contact(contact),
-        )
-        .unwrap()
-        .with_lens(lens);
         let mut errors = Vec::new();
         for k in 0..24_u64 {
             let force = [0.15, 0.25, 0.4][k as usize % 3];

@@ -6,9 +6,9 @@ use ndarray::Array2;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::{Distribution, StandardNormal};
 use tactile_force::{
-    Branch, CalibrationFrame, CalibrationPair, ContactDetector, ContactOptions, Detection,
-    DetectorWorkspace, DriftCorrection, ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace,
-    PressureCurve, PressureCurveOptions, ReferenceFrame, StressCalibration,
+    Branch, CalibrationFrame, CalibrationPair, ContactOptions, DriftCorrection, ForceMeasurement,
+    ForceMeter, ForceOptions, ForceWorkspace, PressureCurve, PressureCurveOptions, ReferenceFrame,
+    StressCalibration,
 };
 
 pub(crate) const SHAPE: (usize, usize) = (200, 240);
@@ -144,9 +144,9 @@ impl Sensor {
         reference: &ReferenceFrame,
         seed: u64,
     ) -> (Vec<CalibrationFrame>, Vec<CalibrationPair>) {
-        let detector = ContactDetector::new(ContactOptions::default());
+        let meter = ForceMeter::new([PIXEL_M; 2], &ForceOptions::default()).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut workspace = DetectorWorkspace::default();
+        let mut workspace = ForceWorkspace::default();
         let (mut frames, mut pairs) = (Vec::new(), Vec::new());
         for k in 0..24 {
             let step = if k < 12 { k + 1 } else { 24 - k };
@@ -161,13 +161,14 @@ impl Sensor {
                 85.0 + 25.0 * rng.random::<f64>(),
             ];
             let frame = self.frame(force, 4e-3, place, branch, 1000 * seed + k as u64);
-            let found: Detection = detector
+            let contact = meter
                 .detect_with(&mut workspace, frame.view(), reference)
+                .unwrap()
                 .unwrap();
             let noise: f64 = StandardNormal.sample(&mut rng);
             let gauge = force * (1.0 + 2e-3 * noise);
             let histogram = workspace.grey_histogram(AREA_M2).unwrap();
-            let sum = found.contact.unwrap().integrated_pixel_value.value;
+            let sum = contact.integrated_pixel_value.value;
             frames.push(CalibrationFrame::new(histogram, gauge, branch).unwrap());
             pairs.push(CalibrationPair {
                 integrated_pixel_value: sum,

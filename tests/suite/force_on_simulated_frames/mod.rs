@@ -42,7 +42,7 @@ fn calibration(scene: &PressScene) -> LinearCalibration {
         .map(|k| 0.2 * f64::from(k))
         .map(|f| CalibrationPair::loading(f / newton_per_grey, f))
         .collect();
-    LinearCalibration::fit(&pairs, &Default::default()).unwrap()
+    LinearCalibration::fit(&pairs).unwrap()
 }
 
 /// A reference with different noise for every seed.

@@ -14,10 +14,7 @@ fn shear_is_the_way_of_the_centroid_since_contact_began() {
     options.loads[1].shear_n = shear_n;
     let stiffness = options.shear_stiffness_n_per_m;
     let trial = Trial::new(options, &CalibrationRun::default()).unwrap();
-    let calibration = ShearCalibration {
-        stiffness_n_per_m: stiffness.map(|value| Estimate::new(value, 0.0)),
-        residual_sd_n: [0.0; 2],
-    };
+    let calibration = ShearCalibration::new(stiffness.map(|value| Estimate::new(value, 0.0)));
     let pipeline = trial.pipeline().unwrap();
     let session = Session::new(&pipeline, &[trial.simulation.reference.view()]).unwrap();
     let mut session = session.with_shear(calibration);

@@ -86,7 +86,7 @@ pub(crate) fn pipeline(trial: &Trial, units: Units) -> Pipeline {
     // has different tiles: the comparison covers the stages after it.
     let contact = ContactOptions::default().with_drift(DriftCorrection::None);
     let options = ForceOptions::default().with_contact(contact);
-    let line = LinearCalibration::fit(&pairs, &Default::default()).expect("a calibration");
+    let line = LinearCalibration::fit(&pairs).expect("a calibration");
     let contact = LightContact::new(line, size, &options).expect("options");
     Pipeline::new(contact, object)
         .expect("a pipeline")
