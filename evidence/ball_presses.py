@@ -3,8 +3,9 @@
 
     evidence/ball_presses.py FOLDER [--size X] [--part K/N] [NAMES ...]
 
-writes FOLDER/NAME.csv and FOLDER/balls.csv of all that are there: a row a load and radius, in the columns of
-`tests/data/finite_element_presses.csv`. Twelve balls, two loads each; a load takes one to four minutes. NAMES keeps some, `--part` shares them out.
+writes FOLDER/NAME.csv and FOLDER/balls.csv with all balls in the folder. There is one row per load and radius, with the columns of
+`tests/data/finite_element_presses.csv`. There are twelve balls with two loads each, and a load takes one to four minutes. NAMES
+selects some balls, and `--part` divides them into jobs.
 
 Axisymmetric quadratic elements with reduced integration (CAX8R) at finite strain, compressible neo-Hooke
 U = C10 (I1 - 3) + (J - 1)^2 / D1 with C10 = mu/2, D1 = 2/kappa. Half of a ball: its equator comes down as a plane and slides.
@@ -29,7 +30,7 @@ from inclusion_scenes import TISSUE, Mesh, even_spline, graded, pressures, print
 # The paper's guide: thickness (mm) and Young's modulus (kPa) from the ball's side; mN, mm and kPa throughout.
 PAPER = ((2.0, 136.0), (3.0, 80.0), (5.0, 34.0))
 POISSON = 0.499
-# Modulus, radius, layers, the angles from the pole (rad) that touch under the two loads.
+# Modulus, radius, layers, and the angles of contact from the pole (rad) under the two loads.
 BALLS = {
     "soft_ball_low": (62.0, 3.0, PAPER, (0.35, 0.5)),
     "soft_ball_high": (62.0, 3.0, PAPER, (0.75, 0.85)),
@@ -44,17 +45,17 @@ BALLS = {
     "flat_middle": (62.0, 5.0, (), (0.45, 0.6)),
     "flat_high": (150.0, 3.0, (), (0.7, 0.8)),
 }
-# Above those of the layers.
+# Numbers above those of the layers.
 BALL = TISSUE
 HEADER = "youngs_modulus_pa,radius_m,layers,force_n,contact_radius_m,indentation_m,r_m,pressure_pa,height_m"
-# Radii that are written of a load.
+# Number of radii that are written per load.
 POINTS = 40
-# Solutions of one load: eight to fifteen are usual.
+# Maximum number of solutions per load. Eight to fifteen are usual.
 MOST_ROUNDS = 40
 
 
 def fill(mesh, us, vs, region, position):
-    """An element for each cell of the lines us and vs."""
+    """One element for each cell of the lines us and vs."""
     def at(lines, k):
         return 0.5 * (lines[k // 2] + lines[(k + 1) // 2])
 
@@ -62,7 +63,7 @@ def fill(mesh, us, vs, region, position):
 
 
 def node(mesh, point, region):
-    """That of a body: at z = 0 the ball's are its own."""
+    """The tag of a body: at z = 0 the ball has its own nodes."""
     return mesh.node(point, region == BALL and abs(point[1]) < 1e-9)
 
 
@@ -93,7 +94,7 @@ def ball_mesh(mesh, radius, contact, size):
     across = [on_core(angle)[0] for angle in angles[:half + 1]]
     along = [on_core(angle)[1] for angle in angles[half:]][::-1]
     fill(mesh, across, along, BALL, lambda x, y: (x, radius - y))
-    # The nodes that touch, middles too, from the pole outwards.
+    # The nodes in contact, including midpoints, from the pole outwards.
     touching = [a for k in range(len(angles) - 1) if angles[k + 1] <= contact + 1e-9 for a in (angles[k], 0.5 * (angles[k] + angles[k + 1]))]
     return [node(mesh, shell(0.0, angle), BALL) for angle in [*touching, contact]]
 
@@ -105,7 +106,7 @@ def layer_mesh(mesh, layers, radius, places, size):
     corners = places[::2] + graded(edge, rim, first, 0.15 * rim * size, 1.3)[1:]
     middles = dict(zip(corners, places[1::2]))
 
-    # Lines go by number, so that middles stay where they are wanted.
+    # Lines are interpolated by number, so that midpoints stay in place.
     def position(u, v):
         k = math.floor(u)
         if u == k:
@@ -179,7 +180,7 @@ def run(text):
 
 
 def least_squares(rows, values):
-    """Coefficients of a linear model by its normal equations."""
+    """Coefficients of a linear model, from its normal equations."""
     n = len(rows[0])
     a = [[sum(r[i] * r[j] for r in rows) for j in range(n)] + [sum(r[i] * y for r, y in zip(rows, values))] for i in range(n)]
     for i in range(n):
@@ -201,12 +202,12 @@ class Contact:
         self.relaxation = 1.0
 
     def solve(self, approach):
-        """Solves once; returns how far tied nodes are apart, along the face."""
+        """Solves once and returns the distance of tied nodes along the face."""
         _, radius, layers, _ = self.case
         mesh = Mesh()
         skin = ball_mesh(mesh, radius, self.contact, self.size)
         places = self.places or [mesh.nodes[n - 1][0] for n in skin]
-        # To begin with, the face is half as steep as the ball.
+        # At first the face is assumed half as steep as the ball.
         tilts = [0.5 * math.asin(mesh.nodes[n - 1][0] / radius) for n in skin]
         normals = self.normals or [(-math.sin(tilt), math.cos(tilt)) for tilt in tilts]
         face, bottom = layer_mesh(mesh, layers, radius, places, self.size) if layers else ([], 0.0)
@@ -242,11 +243,11 @@ class Contact:
         return self.moved[-1][0]
 
     def pressure(self):
-        # The ball lies above: its forces have the other sign.
+        # The ball is above, so that its forces have the opposite sign.
         return [(r, -p) for r, p in pressures(self.mesh, [(n, n) for n in self.skin], self.load)]
 
     def singular(self):
-        """By how much the contact without a singular edge is wider: 2 K / C."""
+        """The amount by which the contact without a singular edge is wider: 2 K / C."""
         a = self.radius()
         points = [(a - r, p) for r, p in self.pressure()][:-2]
         points = [(s, p) for s, p in points if s < 0.5 * a]
@@ -255,7 +256,7 @@ class Contact:
 
 
 def normals_of(points):
-    """Of the curve through points, upwards; level on the axis."""
+    """Normals of the curve through points, upwards and vertical on the axis."""
     found = [(0.0, 1.0)]
     for k in range(1, len(points)):
         k0 = min(max(k - 1, 0), len(points) - 3)
@@ -269,7 +270,7 @@ def normals_of(points):
 
 
 def press(case, contact, size):
-    """The solution whose edge is not singular, and its approach."""
+    """The solution without a singular edge, and its approach."""
     radius, layers = case[1:3]
     body = Contact(case, contact, size)
     approach = (0.9 if layers else 0.8) * radius * math.sin(contact) ** 2
@@ -290,7 +291,7 @@ def press(case, contact, size):
 
 
 def rows(name, contact, size):
-    """What is pressed, force, contact radius, approach, and pressure and height over the radius; in SI units."""
+    """The object, force, contact radius, approach, and pressure and height as functions of the radius, in SI units."""
     modulus, radius, layers, _ = BALLS[name]
     body, approach = press(BALLS[name], contact, size)
     a = body.radius()

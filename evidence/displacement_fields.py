@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Known displacement fields through `tactile strain`: how often the stated 95 % hold the gradient, and how large the error is.
+"""Known displacement fields measured by `tactile strain`: how often the stated 95 % intervals contain the gradient, and the errors.
 
     python3 -m venv V && V/bin/pip install numpy
     V/bin/python evidence/displacement_fields.py PROGRAM [SEEDS] [SIZES]
 
 Seven fields in the plane and in space, on grids, jittered grids and random points of mean spacing 1, with noise of 0, 0.01, 0.1
-and 0.3 spacings: 168 fields a size and seed. Each is a table of known pairs (columns x, y, z, u, v, w). A row for each class:
+and 0.3 spacings: 168 fields per size and seed. Each is a table of known pairs (columns x, y, z, u, v, w). A row for each class:
 gradients inside 1.96 standard errors, those of the steepest tenth of the points, right pairs that were left out, and the
 median over the fields of the root mean square error over the largest gradient. Points within one spacing of an inclusion's
 edge, where the gradient jumps, are not counted.

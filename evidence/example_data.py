@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Write the small inputs in examples/data that the help of the program `tactile` uses.
+"""Writes the small inputs in examples/data that are used in the help of the program `tactile`.
 
     evidence/example_data.py          write them
-    evidence/example_data.py --check  fail where one differs from what this script writes
+    evidence/example_data.py --check  fail if a file differs from the output of this script
 
-Standard library only, the same bytes everywhere.
+It uses only the standard library and writes the same bytes everywhere.
 """
 import math
 import pathlib
@@ -21,7 +21,7 @@ def scattered(k, step):
 
 
 def error(k, step):
-    """A number that stands for a measurement error: scattered between -1/2 and 1/2."""
+    """A number in place of a measurement error, scattered between -1/2 and 1/2."""
     return scattered(k, step) - 0.5
 
 
@@ -31,7 +31,7 @@ def place(k):
 
 
 def moved(k):
-    """Where point k is after the deformation: 5 % longer along x, 2 % shorter along y, sheared, and read with an error."""
+    """Position of point k after the deformation: 5 % longer along x, 2 % shorter along y, sheared, and with a reading error."""
     x, y = place(k)
     return 1.05 * x + 0.02 * y + 0.01 * error(k, 0.831), 0.98 * y + 0.3 + 0.01 * error(k, 0.417)
 
@@ -52,7 +52,7 @@ def cases():
 
 
 def slopes(along_x):
-    """Of the saddle 0.005 x² + 0.01 y² around the middle of 24 rows and 32 columns."""
+    """Slopes of the saddle 0.005 x² + 0.01 y² about the middle of 24 rows and 32 columns."""
     cell = (lambda r, c: 0.01 * (c - 15.5)) if along_x else (lambda r, c: 0.02 * (r - 11.5))
     return "".join(",".join(f"{cell(r, c):.3f}" for c in range(32)) + "\n" for r in range(24))
 
@@ -91,7 +91,7 @@ LOADS_N = [0.01, 0.02]
 
 
 def png(rows):
-    """A grey image of 8 bits, not compressed: the bytes do not depend on the compressor."""
+    """A grey image of 8 bits without compression, so that the bytes do not depend on a compressor."""
     def chunk(tag, data):
         return struct.pack(">I", len(data)) + tag + data + struct.pack(">I", zlib.crc32(tag + data))
     size = struct.pack(">IIBBBBB", len(rows[0]), len(rows), 8, 0, 0, 0, 0)
@@ -145,7 +145,7 @@ def skin_scene():
 
 
 def weight_scene():
-    """The same press, of which one frame was taken under a known weight."""
+    """The same press, with one more frame under a known weight."""
     return scene() + f"""
 [[check]]
 image = "frame_2.png"
@@ -161,7 +161,7 @@ GUIDE_PA, SMALL = 100e3, 72
 
 
 def sensor_frame(ball_m, force, seed):
-    """Hertz's pressure of a rigid ball on the guide, incompressible and deep against the contact."""
+    """Hertz's pressure of a rigid ball on the guide, which is incompressible and deep compared with the contact."""
     a = (3 * force * ball_m / (4 * GUIDE_PA / 0.75)) ** (1 / 3) if force else 1.0
     peak = GREY_PER_PA * 3 * force / (2 * math.pi * a * a)
 
@@ -172,12 +172,13 @@ def sensor_frame(ball_m, force, seed):
     return png([[level(r, c) for c in range(SMALL)] for r in range(SMALL)])
 
 
-# A flat tip of 1 mm radius under weights of 0.4 to 1.2 g. Its pressure is not limited at the edge, so that a pixel has its mean.
+# A flat tip of 1 mm radius under weights of 0.4 to 1.2 g. Its pressure is singular at the edge, so that pixels have the mean
+# pressure.
 TIP_M, WEIGHTS_KG = 1e-3, [0.4e-3, 0.6e-3, 0.8e-3, 1.0e-3, 1.2e-3]
 
 
 def tip_frame(force, seed):
-    """Pressure of a rigid flat tip on a deep guide, F/(2 pi a sqrt(a^2 - r^2)), as the mean over 5 by 5 places of a pixel."""
+    """Pressure of a rigid flat tip on a deep guide, F/(2 pi a sqrt(a^2 - r^2)), as the mean over 5 by 5 positions in a pixel."""
     def pressure(r, c):
         share = PIXEL_M**2 * ((r - 35.2) ** 2 + (c - 35.8) ** 2) / TIP_M**2
         return force / (2 * math.pi * TIP_M**2 * math.sqrt(1 - share)) if share < 1 else 0.0
@@ -269,7 +270,7 @@ def lump_frame(pressures, seed):
         k = min(int(at), len(pressures) - 2) if pressures else 0
         inside = pressures and at < len(pressures) - 1
         pressure = pressures[k] + (at - k) * (pressures[k + 1] - pressures[k]) if inside else 0.0
-        # The face's rim, where the pressure has no limit, is overexposed.
+        # The rim of the face, where the pressure is singular, is overexposed.
         return min(255, round(10 + 2 * error(96 * r + c + seed, 0.7548776662) + LUMP_GREY_PER_PA * pressure))
     return png([[level(r, c) for c in range(96)] for r in range(96)])
 
@@ -311,7 +312,7 @@ layers = [
 
 
 # The same block, 60 mm in radius, without the lump and with it, at two approaches: pressure every 0.25 mm from the axis. Three
-# presses, each some tenths of a millimetre from where it is said to be, around the lump's middle at (8, 4) mm.
+# presses, each some tenths of a millimetre off its stated position, around the centre of the lump at (8, 4) mm.
 SCAN_APPROACHES = [1.5e-3, 3e-3]
 SCAN_PLAIN = [[
     461.4, 461.4, 461.5, 461.6, 461.8, 462.0, 462.2, 462.5, 462.9, 463.3, 463.7, 464.2, 464.7, 465.3, 466.0, 466.6,
@@ -342,7 +343,7 @@ SCAN_PRESSES = [((0, 0), (0.12, -0.2)), ((16, 0), (-0.15, 0.1)), ((8, 14), (0.05
 
 
 def scan_frame(press, load):
-    """A press's pressure, that of the lump laid around its place, in grey levels above 10 with the camera's noise."""
+    """The pressure of a press with the lump at its position, in grey levels above 10 with the noise of the camera."""
     said, off = SCAN_PRESSES[press]
 
     def read(values, mm):
@@ -398,9 +399,9 @@ FILES = {
     "press/skin.toml": skin_scene,
     "press/weight.toml": weight_scene,
     "before.csv": lambda: points((k, place(k)) for k in range(120)),
-    # In another order, and without every 17th.
+    # The points are in another order, and every 17th is missing.
     "after.csv": lambda: points((j, moved(j)) for j in (37 * k % 120 for k in range(120)) if j % 17),
-    # Row by row, for a warp.
+    # The points row by row, for a warp.
     "sources.csv": lambda: points((k, place(k)) for k in range(40)),
     "targets.csv": lambda: points((k, moved(k)) for k in range(40)),
     "queries.csv": lambda: points((k, (1.0 + 2 * (k % 5), 1.0 + 2 * (k // 5))) for k in range(25)),

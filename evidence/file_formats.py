@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Files of points, tables and frames as other programs write them, and what the program makes of them.
+"""Files of points, tables and frames as written by other programs, and their results in the program.
 
     python3 -m venv V && V/bin/pip install numpy pandas scipy opencv-python-headless tifffile imageio
     V/bin/python evidence/file_formats.py FOLDER [PROGRAM]
 
-Writes the files to FOLDER. With PROGRAM (`target/release/tactile`) each is read by it: the answer has to be that of the
-file's numbers, or a refusal with exit code 2 in one sentence that holds the words of its remedy and none of a library.
+Writes the files to FOLDER. PROGRAM (`target/release/tactile`) reads each file. The result must follow from the numbers in the file,
+or the file is refused with exit code 2 and one sentence. The sentence must contain the remedy and no message of a library.
 """
 import itertools, json, pathlib, re, subprocess, sys, zipfile
 import cv2, imageio.v3 as iio, numpy as np, pandas as pd, scipy.io, tifffile
@@ -14,7 +14,7 @@ folder = pathlib.Path(sys.argv[1])
 folder.mkdir(parents=True, exist_ok=True)
 cases = []  # kind of reading, file, numbers that are read, or words of the refusal
 
-# What readers and decoders say in their own words.
+# Words of readers and decoders that must not occur in a message.
 FOREIGN = re.compile(r"Unknown\(|Some\(|None|Err\(|panicked|component Y|ColorType|Format error|invalid digit|decoding|os error 22|TiffError")
 
 
@@ -28,7 +28,7 @@ def case(kind, name, expected, write):
     cases.append((kind, path, expected))
 
 
-# Points: 12 in the plane, coordinates that no other column has.
+# Points: 12 in the plane, with coordinates that occur in no other column.
 points = np.array([[10.5 + 3 * k % 7, 20.25 + k] for k in range(12)])
 holed = np.delete(points, 4, 0)
 columns = {"x": points[:, 0], "y": points[:, 1]}
@@ -156,7 +156,7 @@ case("points", "structure.mat", "save arrays of numbers", lambda p: scipy.io.sav
 case("points", "frame.pkl", "binary file", lambda p: frame.to_pickle(p))
 case("points", "packed.csv.gz", "unpack it", lambda p: frame.to_csv(p))
 
-# Points and where they go: stretched by 1 % along x.
+# Points with displacements: a stretch by 1 % along x.
 moves = pd.DataFrame({**columns, "u": 0.01 * points[:, 0], "v": 0 * points[:, 1]})
 case("moves", "moves.csv", 0.01005, lambda p: moves.to_csv(p, index=False))
 case("moves", "moves.txt", 0.01005, lambda p: np.savetxt(p, moves, header="x y u v"))
@@ -188,7 +188,7 @@ for unit, factor, order in itertools.product(["mm", "um", "m"], [1], [0, 1]):
     case("depth", f"depth_comment_{unit}_{order}.txt", depths[11:],
          lambda p: np.savetxt(p, data, delimiter=",", header=",".join(names)))
 
-# Frames: 12 of 32 × 48 pixels, in the middle darker by 4 from one to the next. As many tenths of a millimetre deep.
+# Frames: 12 of 32 × 48 pixels, whose middle darkens by 4 from one to the next. Each step is a tenth of a millimetre deep.
 dome = np.maximum(1 - (np.hypot(*np.mgrid[-16:16, -24:24]) / 12) ** 4, 0)
 frames = [np.round(150 - 4 * k * dome).astype("u1") for k in range(12)]
 jpegs = [cv2.imencode(".jpg", f, [cv2.IMWRITE_JPEG_QUALITY, 98])[1].tobytes() for f in frames]
@@ -289,7 +289,8 @@ case("frames", "cut_in_half.jpg", "cut short", lambda p: jpegs[11][: len(jpegs[1
 case("frames", "table_for_frames.csv", "a text that begins", lambda p: frame.to_csv(p, index=False))
 case("frames", "truncated.jpg", "cannot use the image", lambda p: jpegs[0][:300])
 
-# More of tables: marks of order and ends of lines, quotes, several lines of headings, numbers in other notations, other kinds of arrays.
+# Further tables: byte order marks and line ends, quotes, several lines of headings, numbers in other notations, other kinds of
+# arrays.
 euro = comma(rows("{x};{y}\n"))
 for name, expected, text in [
     ("excel_german.csv", points * 1e-3, ("\ufeff\"x [mm]\";\"y [mm]\"\n" + euro).replace("\n", "\r\n")),
@@ -401,7 +402,7 @@ for name, text in [("brackets", "darkness [grey_levels];depth [mm]\n"), ("slash"
     case("depth", f"depth_{name}.csv", depths[11:], lambda p: text + comma("".join(f"{g};{d:.3f}\n" for g, d in zip(grey, depth))))
 case("depth", "depth_feet.csv", "m or a multiple", lambda p: "darkness,depth (ft)\n" + "".join(f"{g},{d}\n" for g, d in zip(grey, depth)))
 
-# More of frames: kinds of PNG, JPEG, TIFF, YUV4MPEG2, AVI and NPY.
+# Further frames: kinds of PNG, JPEG, TIFF, YUV4MPEG2, AVI and NPY.
 from PIL import Image
 
 last = Image.fromarray(frames[11])
@@ -458,7 +459,7 @@ case("frames", "space_rgb.y4m", "colour space", lambda p: b"YUV4MPEG2 W48 H32 F2
 
 
 def with_sound(data, odd=b"", second=b""):
-    """An AVI whose first stream is sound, with index, filling, lists of records and a further part."""
+    """An AVI file whose first stream is sound, with index, padding, lists of records and a further part."""
     plain = avi(b"MJPG", data)
     movi = plain.index(b"movi") + 4
     sound = chunk(b"LIST", b"strl" + chunk(b"strh", b"auds" + bytes(52)) + chunk(b"strf", bytes(18)))
@@ -502,7 +503,7 @@ print(len(cases), "files in", folder)
 
 
 def read(program, kind, path):
-    """Exit code, and the numbers that were read, or the sentence."""
+    """Exit code, and the numbers read or the error message."""
     reference, out = folder / "reference.png", folder / "out"
     iio.imwrite(reference, frames[0])
     table = folder / "depth_mm_0.csv"
@@ -533,7 +534,7 @@ if len(sys.argv) > 2:
         elif isinstance(expected, str):
             fits = found == expected
         else:
-            # Depths are known to a grey level, and faint contacts are none.
+            # Depths are accurate to a grey level, and faint contacts are not detected.
             close = dict(rtol=0, atol=0.3 if kind == "frames" else 0.05) if kind in ("frames", "depth") else dict(rtol=1e-4, atol=0)
             fits = code in (0, 1) and np.shape(found) == np.shape(expected) and np.allclose(found, expected, **close)
         wrong += not fits

@@ -1,10 +1,9 @@
 #!/usr/bin/env python3
-"""Runs every `tactile` line of the guide's console blocks, and compares the answers that the guide quotes.
+"""Runs every `tactile` line in the console blocks of the guide, and compares the output with that quoted in the guide.
 
     python3 evidence/guide_commands.py PROGRAM
 
-A block of text that follows a console block quotes the answer of the block's last command: each of its lines but `…` must be one
-of the answer's.
+A block of text after a console block quotes the output of the last command. Each of its lines except `…` must occur in the output.
 """
 import pathlib
 import re

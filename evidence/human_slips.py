@@ -1,10 +1,10 @@
-"""Plausible slips of a person on good data: no answer may be wrong in silence.
+"""Plausible mistakes of a user with valid data: no result may be wrong without a caution.
 
     python3 evidence/human_slips.py --program target/debug/tactile
 
-Each slip is one change of a good call: a unit, a column, a name, a frame, a number read off the wrong line.
-The call is refused, or the interval of every answer holds the truth, or a caution stands beside it that names
-the slip, its field or its consequence. Prints the slips that do none of the three, and how many there were.
+Each mistake is one change of a valid call: a unit, a column, a name, a frame, a number from the wrong line. The call must be
+refused, the interval of every result must contain the truth, or a caution must name the mistake, its field or its consequence.
+Prints the mistakes that violate this, and the number of mistakes.
 """
 
 import argparse
@@ -86,7 +86,7 @@ def option_slips():
 
 
 def truths(command):
-    """Where the answers of a subcommand are, and their truths."""
+    """Places of the results of a subcommand, and their true values."""
     if command in ("measure", "stream"):
         yield ("youngs_modulus_pa",), MODULUS_PA
     if command == "force":
@@ -94,7 +94,7 @@ def truths(command):
 
 
 def answered(program, folder, call):
-    """The answer of a call. None where it is refused."""
+    """The result of a call. None if it is refused."""
     ended = subprocess.run([program, *call.split(), "--json"], cwd=folder, capture_output=True, text=True, timeout=120)
     return None if ended.returncode == 2 or not ended.stdout else json.loads(ended.stdout)
 
@@ -104,7 +104,7 @@ def kinds(answer):
 
 
 def silent(answer, usual):
-    """What went through in silence. A caution that the good data have too (`usual`) is none about the slip."""
+    """Wrong results without a caution. A caution that also occurs for the valid data (`usual`) is not about the mistake."""
     if answer is None or kinds(answer) - usual[answer["command"]]:
         return None
     for path, truth in truths(answer["command"]):
@@ -114,7 +114,7 @@ def silent(answer, usual):
         if not found or "error" in found:
             continue
         low, high = found["interval_95"]
-        # A fiftieth beside the interval is no harm that a slip did.
+        # A result outside its interval by up to a fiftieth is not counted.
         if low is not None and low > 1.02 * truth or high is not None and high < 0.98 * truth:
             return f"{path[0]} {found['value']:.4g} in {low:.4g} to {high:.4g}, true {truth:.4g}"
     return None

@@ -4,7 +4,7 @@
 
 Needs numpy, scipy and CalculiX (`ccx`, or the program named by $CCX). Nothing of the project is
 used. OUT gets NAME.csv for each block and scenes.csv, as the example `picture_study` of
-`tactile-inclusion` reads them. Scenes that stand in scenes.csv are not solved again.
+`tactile-inclusion` reads them. Scenes listed in scenes.csv are not solved again.
 
 A block of tissue (a cylinder, radius R, height H, base held) with an ellipsoidal lump lies under the
 sensor's guide: a disc of radius a, three layers glued to rigid glass that comes down by known
@@ -195,7 +195,7 @@ class Mesh:
 # ------------------------------------------------------------------------------------------------------ CalculiX
 
 def deck(s, m, approach):
-    """CalculiX input.  Two increments an approach, halved where Newton's method fails."""
+    """CalculiX input, with two increments per approach, which are halved if Newton's method fails."""
     out = ["*NODE, NSET=ALL"] + [f"{i + 1},{x:.10e},{y:.10e},{z:.10e}" for i, (x, y, z) in enumerate(m.x)]
     E, nu = [s.E0, s.E1] + [e for _, e in LAYERS], [s.nu] * 2 + [0.495] * len(LAYERS)
     for k in np.unique(m.mat):
@@ -299,9 +299,9 @@ def _zernike(p, order):
 def recover(s, m, x, force, grid, order=12):
     """Pressure (kPa) at points `grid` (N,2; mm, on the deformed face; nan outside it), from nodal positions and forces of the tissue's face.
 
-    Reduced integration makes the forces alternate between corners and middles of sides, so middles are shared out to their ends: integrals of the pressure against
-    bilinear hats, one a corner.  Inside 0.6 a the pressure is the Zernike series that fits them best; beyond 0.75 a it is 1/sqrt(1 - r^2/a^2), a flat punch's, times
-    the bilinear function with these integrals; between them the one passes into the other."""
+    Reduced integration makes the forces alternate between corners and middles of sides, so middles are shared out to their ends: 
+    integrals of the pressure times bilinear hat functions, one per corner.  Inside 0.6 a the pressure is the Zernike series that fits them best; beyond 0.75 a it is 1/sqrt(1 - r^2/a^2), a flat punch's, times
+    the bilinear function with these integrals; between them the two are blended."""
     at = {node: i for i, node in enumerate(m.sets["tissue"])}
     face, start, cut = np.vectorize(at.get)(m.face), m.x[m.sets["guide"]][:, :2], 0.95 * s.a
     xy, X = x[face][..., :2], start[face]

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Makes scenes of a tissue block with a spherical inclusion under the sensor's guide, solved by CalculiX (`ccx`, Debian's calculix-ccx).
+"""Creates scenes of a tissue block with a spherical inclusion under the sensor's guide, solved by CalculiX (`ccx`, Debian's calculix-ccx).
 
     evidence/inclusion_scenes.py FOLDER [--size MM] [--seed N] [--part K/N] [--spheroids] [NAMES ...]
 
 writes FOLDER/scenes.csv and FOLDER/NAME.csv as `tactile-inclusion/examples/inclusion_study` reads them: 108 blocks with an
 inclusion, 32 plain ones, drawn from a fixed seed or N. With --spheroids the inclusions are drawn with heights over widths from 1/1.75 to 1.75
-and the diameter is that of the ball of equal volume. NAMES keeps some, `--part` shares them out; what is there is left. A scene takes 5 to 30 s.
+and the diameter is that of the ball of equal volume. NAMES selects some scenes, and `--part` divides them into jobs. Existing files
+are kept. A scene takes 5 to 30 s.
 
 Axisymmetric quadratic elements with reduced integration (CAX8R) at finite strain, compressible neo-Hooke
 U = C10 (I1 - 3) + (J - 1)^2 / D1 with C10 = mu/2, D1 = 2/kappa. The face's nodes are doubled and tied by equations, in both
@@ -39,7 +40,7 @@ HEADER = ("scene,D_m,depth_m,E1_pa,E0_pa,block_height_m,block_radius_m,disc_radi
 
 
 def half_axes(scene):
-    """Of the inclusion: half its width, half its height."""
+    """Half width and half height of the inclusion."""
     return 0.5 * scene["D"] * scene["aspect"] ** (-1 / 3), 0.5 * scene["D"] * scene["aspect"] ** (2 / 3)
 
 
@@ -56,7 +57,7 @@ def draw(seed, spheroids):
 
     def finish(scene, name, sticks, loads):
         part = rng.uniform(0.08, 0.12)
-        # Beyond 0.09 of the height, shared axial displacements do not hold the rim of a face that slides.
+        # Beyond 0.09 of the height, shared axial displacements are not valid at the rim of a sliding face.
         part = part if sticks else 0.085 + 0.15 * (part - 0.08)
         step = round(part * scene["H"] / loads, 3)
         scene.update(name=name, sticks=sticks, approaches=[step * (k + 1) for k in range(loads)])
@@ -81,7 +82,7 @@ def draw(seed, spheroids):
 
 
 def graded(start, end, first, longest, growth):
-    """Lines from start to end: steps begin at `first` and grow up to `longest`, scaled to fit."""
+    """Lines from start to end. Steps begin at `first`, grow up to `longest`, and are scaled to fit."""
     length, steps, step = abs(end - start), [], first
     while sum(steps) + 0.5 * step < length:
         steps.append(step)
@@ -94,7 +95,7 @@ def graded(start, end, first, longest, growth):
 
 
 class Mesh:
-    """Eight-node quadrilaterals; nodes that coincide and have the same tag are one."""
+    """Eight-node quadrilaterals. Coincident nodes with the same tag are merged."""
 
     def __init__(self):
         self.nodes, self.elements, self.index = [], [], {}
@@ -141,7 +142,7 @@ class Mesh:
 
         def core(k):
             r, z = box(k, half, -tall, tall)
-            # Sides that bulge towards the circle open the angles at the corners.
+            # Sides bulge towards the circle, which opens the angles at the corners.
             scale = 0.92 * (1 + 0.13 * (1 - (r / half) ** 2) + 0.13 * (1 - (z / tall) ** 2))
             return r * scale, centre + z * scale
 
@@ -173,7 +174,7 @@ def build(scene, size):
     """Mesh with the block below z = 0 and the guide above, of elements of about `size`."""
     face, height, diameter, depth = scene["R"], scene["H"], scene["D"], scene["d"]
     half_width, half_height = half_axes(scene)
-    # A rim that sticks is resolved; one that slides turns over where it is finer than this.
+    # A bonded rim is resolved. The elements of a sliding rim are inverted if they are finer than this.
     first, longest, growth = (0.2 * size, size, 1.3) if scene["sticks"] else (0.045 * face, 0.045 * face, 1.0)
     beyond = graded(face, BLOCK_RADIUS, first, 8 * size, 1.7)
     mesh = Mesh()
@@ -207,14 +208,15 @@ def build(scene, size):
 
 
 def between(points, x):
-    """Linear interpolation; the last segment goes on."""
+    """Linear interpolation. The last segment is extrapolated."""
     k = min(max(bisect.bisect([place for place, _ in points], x) - 1, 0), len(points) - 2)
     (a, at_a), (b, at_b) = points[k:k + 2]
     return at_a + (x - a) / (b - a) * (at_b - at_a)
 
 
 def move_block(mesh, scene, shift):
-    """Moves the block's nodes along r: by `shift` over r at the face, by less the deeper and the further beyond the face."""
+    """Moves the block's nodes along r: at the face by `shift` as a function of r, and less with growing depth and distance from the
+    face."""
     face, depth = scene["R"], scene["d"] or 0.4 * scene["H"]
     for node in {node for region, nodes in mesh.elements if region >= TISSUE for node in nodes}:
         r, z = mesh.nodes[node - 1]
@@ -233,7 +235,7 @@ def pairs_of(mesh, scene):
 
 
 def deck(scene, mesh, pairs, approaches, longest):
-    """CalculiX's input: the approaches in equal steps of at most `longest`, what is wanted printed at each."""
+    """CalculiX input: the approaches in equal steps of at most `longest`, with output at each."""
     lines = ["*NODE, NSET=ALL"] + [f"{k},{r:.12g},{z:.12g}" for k, (r, z) in enumerate(mesh.nodes, 1)]
     materials = [(modulus, GUIDE_POISSON) for _, modulus in LAYERS] + [(scene["E0"], scene["nu"])]
     materials += [(scene["E1"], scene["nu"])] if scene["D"] > 0 else []
@@ -261,7 +263,7 @@ def deck(scene, mesh, pairs, approaches, longest):
 
 
 def printed(path):
-    """What CalculiX printed, a load after the other: displacements U and forces RF of nodes, the glass's force."""
+    """The output of CalculiX for each load: displacements U and forces RF of nodes, and the force on the glass."""
     loads, kind, before = [], None, None
     for line in path.read_text().splitlines():
         heading = re.match(r"\s*(displacements|forces|total force) .* time\s+(\S+)", line)
@@ -280,7 +282,7 @@ def printed(path):
 
 
 def run(scene, mesh, pairs, approaches):
-    """Solves a deck, in shorter steps where it does not converge."""
+    """Solves an input, with shorter steps if it does not converge."""
     with tempfile.TemporaryDirectory() as folder:
         job = pathlib.Path(folder) / "job"
         for longest in (0.8, 0.4, 0.2):
@@ -294,7 +296,8 @@ def run(scene, mesh, pairs, approaches):
 
 
 def pressures(mesh, pairs, load):
-    """(r, p) at the centre of each corner's hat function: the forces' sum over its deformed area, less the curvature's part."""
+    """(r, p) at the centre of each corner's hat function: the sum of forces over its deformed area, minus the contribution of the
+    curvature."""
     nodes = [a for a, _ in pairs]
     # The forces are those of a wedge of two degrees.
     forces = [-180 * load["forces"][n][1] for n in nodes]
@@ -346,7 +349,7 @@ def even_spline(points):
 
 
 def solve(scene, size):
-    """Forces in N and pressures by the radius, an approach after the other."""
+    """Forces in N and pressures as functions of the radius, for each approach."""
     if scene["sticks"]:
         mesh = build(scene, size)
         pairs = pairs_of(mesh, scene)

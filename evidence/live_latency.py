@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""How long after a frame's last byte the live page shows its numbers.
+"""Delay between the last byte of a frame and its numbers on the live page, and throughput of a stream.
 
     live_latency.py PROGRAM [--frames 1600] [--rate 80] [--viewers 1]
 
-Pipes frames of a contact, 1392 x 1040 with a camera's noise, to `PROGRAM stream SCENE - --serve` at a fixed rate, reads the
-events as a browser does, and prints the centiles of the time between the two. Standard library only. The sender and the viewers
-share the computer with the program, so that the figures are upper bounds.
+Pipes frames of a contact, 1392 x 1040 with the noise of a camera, to `PROGRAM stream SCENE - --serve` at a fixed rate and reads
+the events as a browser does. Prints the centiles of the delay, the frames per second that the program accepted, and its peak
+memory. With `--rate 100000 --viewers 0` the program sets the rate. Standard library only. The sender and the viewers share the
+computer with the program, so that real figures are better.
 """
 import argparse
 import json
@@ -14,6 +15,7 @@ import os
 import pathlib
 import random
 import re
+import resource
 import socket
 import subprocess
 import tempfile
@@ -105,9 +107,11 @@ def main():
         for viewer in viewers:
             viewer.join()
         program.wait()
-    delays = sorted(1e3 * (seen[k] - complete[k]) for seen in arrivals for k in seen)
+    delays = sorted(1e3 * (seen[k] - complete[k]) for seen in arrivals for k in seen) or [math.nan]
     centiles = {f"{share:g} %": round(delays[int(share / 100 * (len(delays) - 1))], 2) for share in (50, 95, 99, 100)}
-    print(json.dumps({"events": len(delays), "milliseconds": centiles}))
+    seconds = complete[arguments.frames] - complete[1]
+    found = {"events": sum(map(len, arrivals)), "milliseconds": centiles, "frames_per_second": round((arguments.frames - 1) / seconds)}
+    print(json.dumps(found | {"megabytes": round(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024)}))
 
 
 if __name__ == "__main__":

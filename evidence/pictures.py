@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Pictures of README and guide: panels of what the program draws, set side by side.
+"""Pictures of README and guide: panels drawn by the program, side by side.
 
     python3 evidence/pictures.py PROGRAM            writes docs/pictures/*.svg
-    python3 evidence/pictures.py PROGRAM --check    compares their texts with what the program draws now
+    python3 evidence/pictures.py PROGRAM --check    compares their texts with the present output of the program
 
-PROGRAM is `tactile`. Every number in a picture is one that the program wrote into it.
+PROGRAM is `tactile`. Every number in a picture comes from the program.
 """
 import pathlib
 import re
@@ -16,7 +16,8 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 PANEL = re.compile(r'<svg x="(\d+)" y="(\d+)" (width="560" height="420".*?</svg>)', re.S)
 IMAGE = re.compile(r'<image x="(\d+)" y="(\d+)"[^>]*>')
 
-# Picture: the calls that draw it, and the panels (call, file, number of the panel), with a heading each where the panel's own is not enough.
+# Picture: the calls that draw it, and the panels (call, file, number of the panel), with a heading if that of the panel is not
+# sufficient.
 PICTURES = {
     "press": (["measure"], [(0, "frames", 1, "1. frame"), (0, "surfaces", 1, "2. surface (apparent)"),
                             (0, "displacement", 0, "3. displacement and strain"), (0, "summary", 0, "4. modulus, beside the truth")]),
@@ -30,7 +31,7 @@ PICTURES = {
 
 
 def panels_of(svg):
-    """Every panel at the origin, with the images that lie in its box."""
+    """Every panel, moved to the origin, with the images in its box."""
     for x, y, panel in PANEL.findall(svg):
         x, y = int(x), int(y)
         inside = [m for m in IMAGE.finditer(svg) if x <= int(m[1]) < x + 560 and y <= int(m[2]) < y + 420]
@@ -43,7 +44,7 @@ def picture(program, calls, panels):
     with tempfile.TemporaryDirectory() as folder:
         for k, call in enumerate(calls):
             out = pathlib.Path(folder) / str(k)
-            # A calibration writes a file, and its picture beside it.
+            # A calibration writes a file and its picture beside it.
             written = out / "sensor.toml" if call.startswith("calibrate") else out
             subprocess.run([program, *call.split(), "--out", written], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
             for path in out.glob("*.svg"):

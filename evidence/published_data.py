@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Published data sets in the form that tests and studies read.
+"""Converts published data sets to the format of tests and studies.
 
     python3 evidence/published_data.py CLONES DATA
 
 CLONES holds clones of the publishers' repositories under their own names (9DTact, FOTS, SerialTrack, PR-GLS, shape-from-shading,
 Numerical-Shape-From-Shading) at the commits of docs/data.md; DATA gets a folder per set, for TACTILE_DATA. Needs numpy and scipy.
-A set whose files are not found is named and left out.
+If files of a set are missing, the set is named and left out.
 """
 import csv
 import pathlib
@@ -26,7 +26,7 @@ def table(path, heading, rows):
 
 
 def darkening_gel(clone, out):
-    """Sensor 1 of 9DTact: rectified frames, and the makers' table."""
+    """Sensor 1 of 9DTact: rectified frames, and the authors' table."""
     source = clone / "shape_reconstruction/calibration/sensor_1/depth_calibration"
     depths = np.load(source / "Pixel_to_Depth.npy")
     table(out / "grey_to_depth_mm.csv", ["darkness_grey_levels", "depth_mm"], enumerate(depths.tolist()))
@@ -48,7 +48,8 @@ def gel_in_colours(clone, out):
 
 
 def particles(clone, out):
-    """Frames of a plane stretched along x by 5 % of its first length each, and where each first particle is in them."""
+    """Frames of a plane that is stretched along x by 5 % of its first length per frame, and the position of each particle of the
+    first frame."""
     frames = loadmat(clone / "SerialTrack2D/Example_main_files/data_syn_uniaxial_stretch_parCoord.mat")["parCoord_prev"].ravel()
     first, centre = frames[0][:, :2], 255.92
     for k, frame in enumerate(frames[:3]):
@@ -57,7 +58,7 @@ def particles(clone, out):
             continue
         moved = first.copy()
         moved[:, 0] = (1 + 0.05 * k) * (first[:, 0] - centre) + centre
-        # Localisation errs by 0.3 px, the spacing is 8.
+        # The localisation error is 0.3 px, and the spacing is 8 px.
         distance, row = cKDTree(frame[:, :2]).query(moved, distance_upper_bound=2.0)
         table(out / f"stretch2d_truth{k:02}.csv", ["row_in_frame_k_of_frame0_particle"], [[r if np.isfinite(d) else -1] for d, r in zip(distance, row)])
 
@@ -79,7 +80,7 @@ def benchmark(clone, out):
                     lines.append(f"case {shape}_{kind}_{level}_{sample} 2 {len(model)} {len(target)}")
                     lines += [f"m {x!r} {y!r}" for x, y in model.tolist()]
                     lines += [f"t {x!r} {y!r}" for x, y in target[order].tolist()]
-                    # Row i of the publishers' targets is the partner of row i of the model, those beyond are outliers.
+                    # Row i of the publishers' targets is the partner of row i of the model. Further rows are outliers.
                     lines += [f"p {places[i] if i < len(target) else -1}" for i in range(len(model))]
             if lines:
                 out.mkdir(parents=True, exist_ok=True)

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Computes the small reference cases of the stability suites, in 80-digit decimal arithmetic, Python's standard library alone.
+"""Computes the small reference cases of the stability suites, in 80-digit decimal arithmetic, with only Python's standard library.
 
     evidence/reference_cases.py           write tactile-*/tests/reference/*.json
-    evidence/reference_cases.py --check   fail if the files differ from what would be written
+    evidence/reference_cases.py --check   fail if the files differ from the computed ones
 
-Inputs are doubles, and the numbers belong to these doubles; results are printed with 20 digits. `condition` of a case bounds by
-how many roundings of the inputs (2^-52 of each) a result moves, relative to the result's scale: what no algorithm can avoid.
+Inputs are doubles, and the numbers belong to these doubles; results are printed with 20 digits. The `condition` of a case bounds
+the change of a result, relative to its scale, in units of the rounding of the inputs (2^-52 of each). No algorithm can avoid this
+change.
 """
 import json
 import pathlib
@@ -68,7 +69,7 @@ def spline(points, values, smoothing, kernel, queries):
 
 
 def spline_condition(points, values, smoothing, kernel, queries, results):
-    """Sum over all inputs of how far one rounding of it moves the worst query."""
+    """Sum over all inputs of the largest change of a query by one rounding of the input."""
     scale = max(map(abs, values))
     total = [D(0)] * len(queries)
     step = D(10) ** -30
@@ -251,7 +252,8 @@ def matching_cases():
 # Uncertain numbers -----------------------------------------------------------------------------------------------------------
 
 def uncertain_cases():
-    """Parts of f(x, y, z) to first order: the gradient times the parts of a source, in squares for noise, the first of four."""
+    """Contributions to the error of f(x, y, z) to first order: the gradient times the parts of a source, added in squares for
+    noise, the first of four."""
     for number, (name, size) in enumerate([("ordinary", 0), ("scales apart", 9), ("near zero", -12)]):
         stream = Stream(1200 + number)
         inputs = [[stream.next() + 0.5] + stream.point(4, 0.01) for _ in range(3)]
@@ -288,7 +290,7 @@ FILES = {
 
 
 def written(value):
-    """JSON with decimals of 20 digits as numbers; one case a line."""
+    """JSON with decimals of 20 digits as numbers, one case per line."""
     if isinstance(value, Decimal):
         return f"{value:.19e}" if value else "0.0"
     if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""Elementary functions and small matrices over `decimal`, to the context's precision less a few digits."""
+"""Elementary functions and small matrices over `decimal`, to the precision of the context minus a few digits."""
 from decimal import Decimal, getcontext
 
 D = Decimal

@@ -1,12 +1,11 @@
-"""Ends every subcommand that writes at random instants: results are whole, and nothing lies beside them.
+"""Interrupts every subcommand that writes files at random instants: results must be complete, without other files beside them.
 
     python3 fuzz/ends.py --program target/debug/tactile --instants 100 --small-disk /mnt/small
 
-A folder holds the results of an earlier call. The call is done again, with another option, and ended: by
-SIGKILL, SIGTERM or SIGHUP after a random time, by SIGXFSZ or a failed write at a random limit of a file's
-size, or by a full disk, where --small-disk names a folder on a file system of about a megabyte
-(`mount -t tmpfs -o size=1m none /mnt/small`). Every file must then be that of the earlier call or that of
-the whole later one, byte for byte, and no other file may be there.
+A folder contains the results of an earlier call. The call is repeated with another option and interrupted: by SIGKILL, SIGTERM or SIGHUP after a random time, by SIGXFSZ 
+or a failed write at a random file size limit, or by a full disk if --small-disk names a folder on a file system of about a megabyte
+(`mount -t tmpfs -o size=1m none /mnt/small`). Every file must then equal, byte for byte, that of the earlier call or of the
+complete later one, and no other file may exist.
 """
 
 import argparse
@@ -22,7 +21,7 @@ import time
 
 EXAMPLES = pathlib.Path(__file__).parent.parent / "examples" / "data"
 SENSOR = "--pixel-um 40 press/frame_1.png press/frame_2.png"
-# A call, and what the earlier one had in place of a word of it.
+# A call, and the word that the earlier call had in place of one of its words.
 CALLS = [
     ("measure press/scene.toml --points 60", "60", "50"),
     (f"force --reference press/reference.png --pairs press/calibration.csv {SENSOR}", "-um 40", "-um 41"),
@@ -43,7 +42,7 @@ ENDS = ["SIGKILL", "SIGTERM", "SIGHUP", "SIGXFSZ", "failed write", "full disk"]
 
 
 def contents(folder: pathlib.Path) -> dict[str, bytes]:
-    """The files of a folder. The table of matches has the time of each."""
+    """The files of a folder. The table of matches contains times, which are removed."""
     files = {str(f.relative_to(folder)): f.read_bytes() for f in folder.rglob("*") if f.is_file()}
     return {name: TIMES.sub(rb"\1", data) if name == "cases.txt" else data for name, data in files.items()}
 
@@ -56,7 +55,7 @@ def copied(earlier: dict[str, bytes], folder: pathlib.Path) -> None:
 
 
 def run(program: pathlib.Path, call: str, data: pathlib.Path, out: pathlib.Path, ending=None, after_s=None, limit=None) -> float:
-    """Runs a call, ends it, and returns its time."""
+    """Runs a call, interrupts it, and returns its duration."""
     target = out / "sensor.toml" if call.startswith("calibrate sensor") else out
     started = time.monotonic()
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "stdin": subprocess.DEVNULL}

@@ -2,10 +2,9 @@
 
     python3 fuzz/program.py --program target/debug/tactile --seconds 3600 --seed 1
 
-What must hold of every call: it ends within ten seconds of the processor's time with one of the program's exit
-codes and without a panic, takes no more memory than its limit, prints what is wrong in one sentence, and with --json either
-nothing or one object (a stream one a line) of which no measured number lacks its value. A call that breaks a rule is kept with
-its files in --found.
+Requirements for every call: it ends within ten seconds of processor time with a valid exit code and without a panic. It stays
+within its memory limit and reports a fault in one sentence. With --json it prints nothing or one object (a stream prints one per
+line), in which no measured number lacks its value. A call that violates a rule is kept with its files in --found.
 """
 
 import argparse
@@ -40,7 +39,7 @@ FIELDS = ["", "0", "-1", "nan", "inf", "1e308", "-1e-320", "1e999", "9" * 20, "x
 
 
 def piece(data: bytes, at: int, separators: bytes) -> slice:
-    """The line or field around a place, without what ends it."""
+    """The line or field around a position, without its end."""
     start, end = at, at
     while start > 0 and data[start - 1] not in separators:
         start -= 1
@@ -91,11 +90,11 @@ def mutated_call(call: str, draw: random.Random) -> list[str]:
 
 
 def complaint(folder: pathlib.Path, program: pathlib.Path, words: list[str], longest_s: int) -> str | None:
-    """What is wrong with how a call ended; nothing where all is as it should be."""
+    """A description of the fault in how a call ended, or nothing if there is none."""
 
     def limit() -> None:
         resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, ADDRESS_SPACE))
-        # The processor's time, since others may keep the machine busy.
+        # Processor time, because the machine may be busy.
         resource.setrlimit(resource.RLIMIT_CPU, (longest_s, longest_s))
 
     command = [program, *words, "--json", "--out", "results"]
@@ -108,14 +107,14 @@ def complaint(folder: pathlib.Path, program: pathlib.Path, words: list[str], lon
     errors = ended.stderr.decode(errors="replace")
     if "panicked" in errors or ended.returncode not in CODES:
         return f"ended with {ended.returncode}: {errors[:300]}"
-    # A stream has a sentence for every frame that cannot be used.
+    # A stream prints a sentence for every unusable frame.
     sentences = [line for line in errors.splitlines() if line.startswith("tactile: ")]
     if ended.returncode == 2 and "Usage" not in errors and not 1 <= len(sentences) <= len(words):
         return f"does not say what is wrong in a sentence: {errors[:300]}"
     if not ended.stdout:
         return None
     try:
-        # A stream prints a line of JSON for every frame before its answer.
+        # A stream prints a line of JSON for every frame before its result.
         answer = [json.loads(line) for line in ended.stdout.splitlines()] if words[0] == "stream" else json.loads(ended.stdout)
     except ValueError as error:
         return f"prints no JSON: {error}"
@@ -123,7 +122,7 @@ def complaint(folder: pathlib.Path, program: pathlib.Path, words: list[str], lon
 
 
 def silent(value: object, at: str) -> str | None:
-    """A measured number that is none, without an error in its place."""
+    """A measured number without a value and without an error in its place."""
     if isinstance(value, dict):
         if "interval_95" in value and value.get("value") is None:
             return f"{at} has no value"
@@ -152,7 +151,7 @@ def main() -> None:
             shutil.copytree(EXAMPLES, folder)
             words = mutated_call(draw.choice(CALLS), draw)
             named = [folder / word for word in words if (folder / word).is_file()]
-            # What a scene names is as likely to be wrong as the scene.
+            # A file named in a scene is as likely to be faulty as the scene.
             beside = [path for file in named if file.suffix == ".toml" for path in file.parent.iterdir() if path.is_file()]
             for path in draw.sample(named + beside, k=min(len(named + beside), draw.randint(0, 2))):
                 path.write_bytes(mutated(path.read_bytes(), draw))

@@ -115,7 +115,7 @@ pub(crate) fn calibrated(group: &mut BenchmarkGroup<'_, WallTime>) {
     let times = medians(&mut sessions, frames).map(|time| 1e3 * time.as_secs_f64());
     let truth_n = trial.simulation.truth[1].contact.force_n;
     for ((name, time), session) in names.iter().zip(times).zip(&mut sessions) {
-        // The frame of the last turn was that of the larger load.
+        // The last iteration measured the frame of the larger load.
         let reading = session.push(frames[1].view()).expect("a frame").contact;
         let error = reading.expect("a contact").force_n.expect("a force").value / truth_n - 1.0;
         // The contact is in the middle of the frame, where lens and light of the calibration apply

@@ -1,7 +1,7 @@
 """Problems with known answers: point sets to match, splines to fit, slopes to integrate.
 
 Case files are those of `tactile match`: a line `case NAME D n_model n_target`, then rows `m` (model point), `t` (target point,
-shuffled), `g` (noise-free true place of a model point) and `p` (row of its true partner among the targets, -1 for none). Programs
+shuffled), `g` (noise-free true position of a model point) and `p` (row of its true partner among the targets, -1 for none). Programs
 see `m` and `t`.
 """
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ import numpy as np
 
 @dataclass
 class Case:
-    """Two point sets and, for every model point, its true place and the row of its partner."""
+    """Two point sets and, for every model point, its true position and the row of its partner."""
 
     name: str
     model: np.ndarray
@@ -34,7 +34,7 @@ class Case:
     def score(self, warped, assigned):
         """Mean distance of the warped points from the truth, and share of right partners, over the points that have one."""
         paired = self.partner >= 0
-        # Published files give the true place of paired points alone.
+        # Published files give true positions only for paired points.
         truth = self.truth if len(self.truth) == paired.sum() else self.truth[paired]
         error = np.linalg.norm(np.asarray(warped)[paired] - truth, axis=1).mean()
         return float(error), float((np.asarray(assigned)[paired] == self.partner[paired]).mean())
@@ -79,7 +79,7 @@ SHAPES = {"plane105": (2, 105), "space105": (3, 105), "space200": (3, 200)}
 
 
 def scattered(n, rng):
-    """Points of the unit disc, each the farthest from those before it among ten draws: even, without being a lattice."""
+    """Points of the unit disc. Each is the farthest of ten draws from the previous points, so that they are even but not a lattice."""
     points = np.zeros((0, 2))
     while len(points) < n:
         draws = rng.uniform(-1, 1, (40, 2))
@@ -90,7 +90,7 @@ def scattered(n, rng):
 
 
 def smooth_field(model, rms, diameter, rng):
-    """A random affine field and six Gaussians as wide as 0.4 diameters; None where it folds or stretches by more than 2.5."""
+    """A random affine field and six Gaussians with a width of 0.4 diameters. None if it folds or stretches by more than 2.5."""
     n, dim = model.shape
     low, high = model.min(0), model.max(0)
     centres, amplitudes = rng.uniform(low, high, (6, dim)), rng.normal(size=(6, dim))
@@ -110,7 +110,7 @@ def smooth_field(model, rms, diameter, rng):
 
 
 def synthetic(shape, level, degradation, seed):
-    """A disc (plane) or a bell over it (space), moved by a smooth field and degraded; the draw depends on all arguments."""
+    """A disc (plane) or a bell over it (space), moved by a smooth field and degraded; the random draw depends on all arguments."""
     dim, n = SHAPES[shape]
     rng = np.random.default_rng([seed, level, dim, n])
     model = scattered(n, rng)
@@ -121,7 +121,7 @@ def synthetic(shape, level, degradation, seed):
     while field is None:
         field = smooth_field(model, LEVELS[level] * diameter, diameter, rng)
     truth, kept = model + field, np.arange(n)
-    # The degradations of one seed have their geometry in common.
+    # The degradations of one seed share their geometry.
     rng = np.random.default_rng([seed, level, dim, n, 1 + DEGRADATIONS.index(degradation)])
     target = truth
     if degradation == "noise":

@@ -1,9 +1,9 @@
-"""What a call from Python costs, and matching beside rustcpd's wheel, in one process.
+"""The cost of a call from Python, and matching compared with the rustcpd wheel, in one process.
 
     pip install ./tactile-python rustcpd==4.0.0
     python evidence/peers/python_calls.py
 
-Times are processor times of the thread, the least of the rounds.
+Times are processor times of the thread, the shortest of all rounds.
 """
 import time
 from itertools import cycle
@@ -26,7 +26,7 @@ def least(call, rounds, calls=1):
 
 
 def sessions():
-    """A frame so small that the call is all there is, and the full ones of `force_of_a_frame`, which
+    """A tiny frame, for which the call itself takes all the time, and the full frames of `force_of_a_frame`, which
     `cargo bench --bench pipeline` times."""
     for coarser, rounds in ((64, 200), (1, 200)):
         scene = ti.simulate(coarser=coarser, physics="hertz")
@@ -64,7 +64,7 @@ def matches(seeds=3):
 
 
 def normalised(case):
-    """Both sets by the similarity that brings the model to unit radius, and the way back."""
+    """Both sets scaled by the similarity that gives the model unit radius, and the inverse map."""
     centre = case.model.mean(axis=0)
     scale = np.sqrt(((case.model - centre) ** 2).sum(axis=1).mean())
     there = lambda points: (points - centre) / scale

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""The installed Python package beside SciPy, rustcpd and pycpd, all in one run.
+"""Compares the installed Python package with SciPy, rustcpd and pycpd in one run.
 
     evidence/peers/python_package.py     # where tactile_imaging, scipy, pycpd 2 and rustcpd 4 are installed
 
-Each program gets a problem in turn, several rounds, and its least time counts. One thread each. Packages that are not
-installed are left out.
+Each package solves a problem in turn, in several rounds with one thread, and its shortest time counts. Missing packages are left
+out.
 """
 
 import importlib
@@ -28,7 +28,7 @@ def package(name):
 
 
 def race(title, programs, rounds=5):
-    """Least seconds of each program, and how often they go into those of the first."""
+    """Shortest time of each package in seconds, and the ratio to the first."""
     best = dict.fromkeys(programs, np.inf)
     for _ in range(rounds):
         for name, program in programs.items():

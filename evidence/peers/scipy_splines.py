@@ -3,9 +3,8 @@
 
     evidence/peers/scipy_splines.py      # where SciPy, pytest and tactile_imaging are installed
 
-The tests are those of the SciPy that is installed. One that asks for what `ThinPlateSpline` does not offer is skipped with
-the reason: other kernels, polynomials of another degree, neighbours, smoothing by site. Errors are compared by kind, not by
-their words.
+The tests are those of the installed SciPy. A test of a feature that `ThinPlateSpline` does not offer is skipped with the reason:
+other kernels, polynomials of another degree, neighbours, smoothing by site. Errors are compared by type, not by their messages.
 """
 
 import sys
@@ -18,7 +17,7 @@ from scipy.interpolate.tests import test_rbfinterp as theirs
 
 
 class Spline:
-    """`RBFInterpolator`, as far as it goes."""
+    """The supported part of `RBFInterpolator`."""
 
     def __init__(self, y, d, neighbors=None, smoothing=0.0, kernel="thin_plate_spline", epsilon=None, degree=None):
         offered = ["thin_plate_spline", "linear", "cubic"]
@@ -29,7 +28,7 @@ class Spline:
         if np.ndim(smoothing):
             pytest.skip("smoothing by site is not offered")
         self.spline = ti.ThinPlateSpline(y, d, smoothing=smoothing, kernel=kernel)
-        # If the points determine no affine part, theirs is an error and ours has a flag. Theirs of "linear" has none.
+        # If the points determine no affine part, SciPy raises an error and ours has a flag. SciPy's "linear" has no affine part.
         if self.spline.flags and kernel != "linear":
             raise np.linalg.LinAlgError(self.spline.flags[0])
 
@@ -38,7 +37,7 @@ class Spline:
 
 
 class Plugin:
-    """NumPy alone, errors by kind, a class of their tests."""
+    """Uses only NumPy, compares errors by type, and runs one class of the tests."""
 
     @pytest.fixture
     def xp(self):

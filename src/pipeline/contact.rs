@@ -395,7 +395,7 @@ impl FrameContact {
     /// Number of pixels in the contact.
     pub(super) fn pixels(&self) -> usize {
         let count = |pixels: &[bool]| {
-            // Sums over short runs fit in a byte, which vectorises well.
+            // Sums over short runs fit in a byte, so that they vectorise well.
             let sum = |run: &[bool]| run.iter().map(|inside| u8::from(*inside)).sum::<u8>();
             pixels.chunks(128).map(|run| usize::from(sum(run))).sum()
         };

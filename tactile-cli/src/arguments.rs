@@ -225,7 +225,7 @@ impl TableArguments {
         if let [first, ..] = &empty[..] {
             let of_all = count(empty.len() + frames.len(), "frame");
             let sentence = format!(
-                "{} of {of_all} without points passed over, the first {first}",
+                "{} of {of_all} without points skipped, the first {first}",
                 empty.len()
             );
             context.warn("frames_empty", json!({ "frames": empty.len() }), sentence);

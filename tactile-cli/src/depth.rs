@@ -109,8 +109,7 @@ impl DepthArguments {
             let zeroed = table.clone().zeroed().map_err(PipelineError::DepthTable);
             zeroed.map_err(in_table)?;
         }
-        // The depth follows from the table, whatever the object is. The object only determines the
-        // fits.
+        // The depth follows from the table for any object. The object only determines the fits.
         let unknown = Object::Unknown {
             poisson_ratio: Object::DEFAULT_POISSON_RATIO,
         };

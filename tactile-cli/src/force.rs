@@ -52,7 +52,7 @@ pub(crate) fn run(arguments: &ForceArguments, context: &mut Context) -> Result<E
         .plan(&[table, PairLine::PAGE], &frames.files(pairs))?;
     let line = PairLine::read(pairs, false, reading, context)?;
     let image = frames.read_reference(Grey::default())?;
-    // Forces follow from the light, whatever the object is.
+    // Forces follow from the light for any object.
     let object = Object::Unknown {
         poisson_ratio: Object::DEFAULT_POISSON_RATIO,
     };

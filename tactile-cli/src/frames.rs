@@ -240,7 +240,7 @@ fn passed_over(path: &Path, source: &FrameReader, context: &mut Context) -> usiz
     let path = path.display();
     if let [first, ..] = sentences {
         let frames = count(damaged as usize, "damaged frame");
-        let sentence = format!("{path}: {frames} passed over, the first {first}");
+        let sentence = format!("{path}: {frames} skipped, the first {first}");
         context.warn("frames_damaged", json!({ "frames": damaged }), sentence);
     }
     if dropped > 0 {
@@ -285,17 +285,20 @@ impl Colours {
             return;
         };
         let (path, reference) = (path.display(), reference.display());
-        let remedy = "Save both alike, and as those of the calibration";
+        let remedy = "Save both in the same way, as for the calibration";
         let sentence = match (rest, frame) {
             (None, Some(_)) => format!(
-                "{path} is in colour and {reference} is grey: its channels are weighed as those of \
+                "{path} is in colour and {reference} is grey: its channels are weighted as those \
+                 of \
                  an image in red, green and blue. {remedy}"
             ),
             (Some(_), None) => format!("{path} is grey and {reference} is in colour. {remedy}"),
             (Some(rest), Some([r, g, b]))
                 if off(rest, [b, g, r]) < EXCHANGED * off(rest, [r, g, b]) =>
             {
-                format!("red and blue of {path} seem to be exchanged against {reference}. {remedy}")
+                format!(
+                    "red and blue seem to be exchanged between {path} and {reference}. {remedy}"
+                )
             }
             _ => return,
         };

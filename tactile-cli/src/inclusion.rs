@@ -41,19 +41,19 @@ Examples:
 The scene file:
   reference = \"reference.png\"
   pixel_size_m = [3.44e-4, 3.44e-4]
-  frames = [{ image = \"frame_1.png\", approach_m = 1e-3, force_N = 0.35 }]     growing \
-                        approaches; three tell most
-  or, of a scan, for each press [[presses]] with position_m = [x, y] and frames, all with the same \
-                        approaches, and position_error_m (2e-4 if absent)
+  frames = [{ image = \"frame_1.png\", approach_m = 1e-3, force_N = 0.35 }]     increasing \
+                        approaches, at best three
+  For a scan, [[presses]] replaces frames: position_m = [x, y] and frames for each press, all with \
+                        the same approaches, and position_error_m (2e-4 if absent)
   [calibration]
   pairs = \"calibration.csv\"; without it the force_N of every frame, spread over its light, gives \
                         the pressure
   [object]
   shape = \"block\"; height_m, radius_m; interface = \"bonded\" or \"frictionless\" (both are \
-                        tried where it is absent);
+  tried if it is absent);
   height_error_m (2 % if absent), poisson_ratio and poisson_ratio_error (0.495, 0.005), \
                         approach_error_m (2e-5),
-  youngs_modulus_pa and youngs_modulus_error_pa where the tissue's modulus is known
+  youngs_modulus_pa and youngs_modulus_error_pa if the tissue's modulus is known
   [waveguide]
   radius_m; layers = [{ thickness_m, youngs_modulus_pa, poisson_ratio }], from the block's side to \
                         the glass")]
@@ -405,7 +405,7 @@ fn print(estimate: &InclusionEstimate, scan: &Scan, context: &mut Context) {
     let verdict = match (estimate.verdict(), estimate.probability) {
         (SearchVerdict::Found, _) if lumps.len() > 1 => "two lumps".to_owned(),
         (SearchVerdict::Found, _) => "a lump".to_owned(),
-        (SearchVerdict::Absent, _) => "no lump that these frames show".to_owned(),
+        (SearchVerdict::Absent, _) => "no lump visible in these frames".to_owned(),
         (SearchVerdict::Uncertain, p) if p > 0.5 => {
             format!("uncertain: a lump with probability {p:.2}")
         }

@@ -97,11 +97,11 @@ Examples, one for each subcommand:
   tactile paper --out target/paper
 
 Exit codes:
-  0    all that was asked for is there
-  1    results were printed, but a stage has no answer; it is printed with its reason
+  0    all requested results are available
+  1    results were printed, but a stage failed; its reason is printed
   2    an argument or a file cannot be used; nothing was computed
   3    a result could not be written
-  130  stopped by Ctrl-C; what was there was printed";
+  130  stopped by Ctrl-C; the results so far were printed";
 
 #[derive(Subcommand)]
 enum Command {

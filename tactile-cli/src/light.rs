@@ -70,7 +70,7 @@ fn traced(arguments: &LightArguments, context: &mut Context) -> Result<Option<Pa
         panels.push(panel()?);
         bar.done(panels.len());
     }
-    Ok(Some(Page::new("Why the sensor sees a press", 2, panels)))
+    Ok(Some(Page::new("How the sensor detects a press", 2, panels)))
 }
 
 /// Prints how each layer traps light.
@@ -211,7 +211,7 @@ impl Tracer<'_> {
     }
 
     fn against_slope(&self) -> Result<Panel, OpticsError> {
-        let title = "Light to the camera against the dimple's steepest slope";
+        let title = "Light to the camera as a function of the dimple's steepest slope";
         let mut panel = Panel::new(title, "steepest slope", "light to the camera (%)");
         for (geometry, name, colour) in [
             (Geometry::Section, "section", Colour::Blue),

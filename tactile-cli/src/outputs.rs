@@ -165,7 +165,7 @@ impl Outputs {
             // Frames of one name from two folders.
             if !taken.insert(name.as_ref()) {
                 return Err(Failure::input(format!(
-                    "two inputs would be answered in the same file {}: rename one",
+                    "two inputs would have the same result file {}: rename one",
                     path.display()
                 )));
             }

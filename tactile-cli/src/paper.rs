@@ -35,7 +35,7 @@ const LEVEL_FROM: f64 = 0.98;
 Example:
   tactile paper --out target/paper
 
-Every part has a command of its own:
+Every part also has its own command:
   calibration with your own sensor   tactile calibrate examples/data/sensor/calibration.toml
   force and contact of a frame       tactile force --help
   modulus by the printed stages      tactile measure SCENE.toml   with `stages.as_printed = true`
@@ -266,10 +266,10 @@ fn centroid_line(trial: &Trial) -> Found<Experiment> {
         Colour::Grey,
         "pixels, every eighth",
     );
-    let title = "Fig. 8: what the curves leave of the row";
+    let title = "Fig. 8: residuals of the curves";
     let axes = (
         "distance from the centroid (mm)",
-        "pixel less curve (grey levels)",
+        "pixel − curve (grey levels)",
     );
     let mut residuals = Panel::new(title, axes.0, axes.1);
     let title = "The line through the centroid at 0.7 N (Fig. 8)";
@@ -522,7 +522,11 @@ fn specification(trial: &Trial) -> Found<Experiment> {
     );
     found.row("hysteresis", "none", format!("{loop_percent:.2} % of 2 N"));
     let rate = digits(rate_hz, 3);
-    found.row("frames a second (forces of whole frames here)", "80", rate);
+    found.row(
+        "frames per second (forces of whole frames here)",
+        "80",
+        rate,
+    );
     let pixel = format!("{:.2} µm", 1e6 * pixel_m);
     found.row(
         "pixel on the sensing surface",

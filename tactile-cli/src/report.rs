@@ -333,7 +333,7 @@ fn kind(flag: &Flag) -> String {
 fn hash(path: &Path) -> String {
     let hashed = || -> std::io::Result<String> {
         if !path.is_file() {
-            return Ok("no file: what it delivered is not kept".to_owned());
+            return Ok("not a regular file: its content is not kept".to_owned());
         }
         let mut file = std::fs::File::open(path)?;
         let (mut hash, mut bytes) = (Hash::new(), vec![0; 1 << 16]);

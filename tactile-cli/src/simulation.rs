@@ -105,8 +105,8 @@ impl Simulation {
             };
             let error = match error {
                 SimulateError::CalibrationSaturates { .. } => {
-                    "the gain that suits so small a force saturates the camera in the calibration \
-                     up to 2 N: give larger ones"
+                    "the gain for such a small force saturates the camera in the calibration up to \
+                     2 N: give larger forces"
                         .to_owned()
                 }
                 error => error.to_string(),

@@ -53,7 +53,7 @@ pub(crate) fn read(
         context.warn(
             "slopes_of_no_surface",
             json!({ "closure": given, "closure_otherwise": least }),
-            format_args!("the slopes are those of no surface, but nearly so {how}"),
+            format_args!("the slopes do not belong to a surface, but nearly do {how}"),
         );
     }
     Ok(slopes)
@@ -94,7 +94,7 @@ fn normal_map(path: &Path, pixel: [f64; 2], context: &mut Context) -> Result<Slo
         "normal_map",
         json!({ "y": direction }),
         format_args!(
-            "{}: a normal map, its y taken to point {direction}, {words}",
+            "{}: a normal map, with y assumed to point {direction}, {words}",
             path.display()
         ),
     );

@@ -396,7 +396,7 @@ impl<const D: usize> StrainReport<D> {
             before: Vec::new(),
             after: Vec::new(),
             matched: Vec::new(),
-            strain: Err("no frame could be followed".to_owned()),
+            strain: Err("no frame could be tracked".to_owned()),
             frames: None,
             complete: true,
             measure: arguments.measure.strain().name(),
@@ -437,8 +437,8 @@ impl<const D: usize> StrainReport<D> {
         );
         if found.unresolved > 0 {
             let text = format!(
-                "the noise about {} points is far above that elsewhere: short waves or jumps that \
-                 the points do not resolve",
+                "the noise about {} points is far above that elsewhere: the points do not resolve \
+                 short waves or jumps",
                 found.unresolved
             );
             context.warn("unresolved", json!({ "points": found.unresolved }), text);

@@ -42,7 +42,7 @@ Examples:
   tactile integrate examples/data/slope_x.csv examples/data/slope_y.csv
   tactile integrate examples/data/slope_x.csv examples/data/slope_y.csv --pixel-size 5e-5 --out \
                         target/integrate
-Without --method: poisson, or least-squares where there is a mask, known heights or a slope that \
+Without --method: poisson, or least-squares if there is a mask, known heights or a slope that \
                         is NaN.")]
 pub(crate) struct IntegrateArguments {
     /// Slopes along x, or a normal map.
@@ -160,9 +160,7 @@ pub(crate) fn integrate(
         context.warn(
             "components",
             json!({ "components": components }),
-            format_args!(
-                "{components} parts do not touch: their heights are not known against each other"
-            ),
+            format_args!("{components} parts do not touch: their relative heights are unknown"),
         );
     }
     context.value(&json!({
@@ -176,7 +174,7 @@ pub(crate) fn integrate(
     );
     let heights = span(&surface.heights, 1.0, "(unit of the pixel size)");
     context.row("heights", heights);
-    let text = four_digits(rms) + " rms between the given ones and those of the heights";
+    let text = four_digits(rms) + " rms between the given slopes and those of the heights";
     context.row("slopes", text);
     context
         .outputs

@@ -182,7 +182,7 @@ fn warp<const D: usize, K: Kernel>(
             json!({ "spanned": spanned, "of": D }),
             format_args!(
                 "the sources span {spanned} of {D} directions; displacements are interpolated \
-                 along these, and lengths across stay as they are"
+                 along these, and lengths across stay unchanged"
             ),
         );
     }

@@ -18,8 +18,8 @@ use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 pub fn quantile_95(degrees: Option<f64>) -> f64 {
     const UPPER_TAIL: f64 = 0.975;
     let z = Normal::standard().inverse_cdf(UPPER_TAIL);
-    // A number of degrees that is NaN, zero or negative has no distribution, so that the value is
-    // unbounded.
+    // If the degrees of freedom are NaN, zero or negative, there is no distribution, and the value
+    // is unbounded.
     match degrees.and_then(|n| Some((n, StudentsT::new(0.0, 1.0, n).ok()?))) {
         // The iteration for the inverse loses digits as the degrees of freedom increase, and does
         // not end for millions of them (a calibration without scatter). The expansion about the
@@ -172,7 +172,7 @@ mod tests {
         // −z (z² + 1)/(4 n²) for a step of one.
         assert!((step + 2.4e-6).abs() < 5e-7, "{step:e}");
         for degrees in [1e6, 1e12, 1e25, f64::MAX] {
-            // 1.2e-6 at a million.
+            // The difference is 1.2e-6 for a million degrees of freedom.
             assert_relative_eq!(
                 quantile_95(Some(degrees)),
                 quantile_95(None),

@@ -262,7 +262,7 @@ impl Uncertain {
     /// The standard error from all sources.
     #[must_use]
     pub fn standard_error(&self) -> f64 {
-        // Most sources have no part, and `hypot` is slower than the test.
+        // Most sources contribute nothing, and `hypot` is slower than the test.
         let parts = self.parts.iter().filter(|part| **part != 0.0);
         parts.fold(0.0, |sum: f64, part| sum.hypot(*part))
     }

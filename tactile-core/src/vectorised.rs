@@ -15,8 +15,8 @@ impl<R, F: FnMut() -> R> Loop for F {
     type Output = R;
     #[inline(always)]
     fn run(mut self) -> R {
-        // Called as `FnMut`: as `FnOnce`, a closure is called through a function of the standard
-        // library that is not inlined.
+        // The closure is called as `FnMut`, because a call as `FnOnce` goes through a function of
+        // the standard library that is not inlined.
         self()
     }
 }

@@ -18,7 +18,7 @@ pub(crate) struct BodyIndex(usize);
 /// Support of a boundary.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Support {
-    /// Displaced with the support only: glued to glass or to a stage.
+    /// Moves only with the support: glued to glass or to a stage.
     Bonded,
     /// Free to slide along r: on a lubricated stage, or in a plane of symmetry.
     Sliding,

@@ -177,7 +177,7 @@ pub(crate) fn respond<'a>(
     &responses[..bends.len() - 2]
 }
 
-/// Responses below this are counted in pairs.
+/// Responses below this are counted two at a time.
 pub(crate) const SMALL: u16 = 64;
 
 /// Counts of a frame's responses. If two neighbours are both small, as nearly all are, they are

@@ -484,8 +484,8 @@ impl Sums {
     /// Variance of Σ d: from the noise of each pixel and from the common errors of background and
     /// scale, which are fully correlated.
     pub(crate) fn variance(&self, noise: &DifferenceNoise) -> f64 {
-        // Independent noise adds in squares. Errors of background and scale have one cause, so they
-        // are added before squaring.
+        // Independent noise adds in quadrature. Errors of background and scale have one cause, so
+        // they are added before squaring.
         noise.background * self.plain[0]
             + noise.gain * self.weighted[0].max(0.0)
             + (noise.common.sqrt() * self.plain[0] + noise.scale.sqrt() * self.weighted[0]).powi(2)

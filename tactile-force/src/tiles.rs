@@ -92,8 +92,8 @@ pub(crate) fn scan(
             darkest: &mut tiles.darkest[here],
             brightest,
         };
-        // In memory order, distant pixels arrive in half the time that tiles need to fetch them
-        // from eight rows in turn.
+        // Reading pixels in memory order takes half the time of reading tiles from eight rows in
+        // turn.
         band.clear();
         band.extend_from_slice(rows);
         summarise_band(band, size.1, of_band);

@@ -191,7 +191,7 @@ impl Fit {
         let at = [self.factor * x, self.factor * y];
         let [nx, ny] = self.face.normal(at);
         let up = 1.0 - nx * nx - ny * ny;
-        // A ball of this size does not reach this far, which makes the fit worse.
+        // A ball of this size does not extend this far, which makes the fit worse.
         let components = [nx, ny, up.max(0.0).sqrt() - 1.0];
         let terms: [f64; TERMS] = core::array::from_fn(|k| components[k % 3] * place[k / 3]);
         for (i, a) in terms.iter().enumerate() {

@@ -230,7 +230,8 @@ impl fmt::Display for InclusionWarning {
         match self {
             Self::PoorFit { excess } => write!(
                 f,
-                "the misfit is {excess:.1} times what the errors explain: several lumps, one \
+                "the misfit is {excess:.1} times as large as the errors explain: several lumps, \
+                 one \
                  off the axis, a stiffer skin, or wrong sizes or forces; errors are widened"
             ),
             Self::OneFrame => {

@@ -28,7 +28,8 @@ const LEAST_GAIN: f64 = 100.0;
 /// scaled from it.
 const CONTRAST: f64 = 8.0;
 
-/// Possible multiples of an inclusion's logarithm, over all contrasts.
+/// Range of the factor by which the logarithmic effect of an inclusion may be scaled, over all
+/// contrasts.
 const POSSIBLE: core::ops::Range<f64> = 0.15..2.5;
 
 /// Fineness of the meshes for the map of positions, in small strain.

@@ -67,7 +67,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut stream = Stream(seed);
     let (mut model, mut truth, mut images) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..n {
-        // Seen through the unit square, beyond which there are more points.
+        // Only the unit square is visible, and there are more points outside.
         let p = Point2::new(stream.next(), stream.next()) * 1.2 - SVector::repeat(0.1);
         let inside = |p: &Point2<f64>| p.iter().all(|c| (0.0..1.0).contains(c));
         let place = image(motion, &p);

@@ -68,7 +68,7 @@ pub enum MatchError {
     /// A method that compares each model point with each target has too many of them.
     #[error(
         "{model} model points and {target} targets make more than {limit} pairs, which this method \
-         keeps in memory; the default matcher takes sets of this size"
+         keeps in memory; the default matcher can match sets of this size"
     )]
     TooManyPairs {
         /// Number of model points.

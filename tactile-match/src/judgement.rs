@@ -139,7 +139,7 @@ fn write_repeats(f: &mut std::fmt::Formatter<'_>, step: &[f64; 3]) -> std::fmt::
     )
 }
 
-// Pairs alone: do neighbours move together?
+// Judges pairs by whether neighbours move together.
 //
 // Correct pairs follow a field that is smooth over a few points. Wrong pairs are off by distances
 // of the order of the spacing, whatever method found them. So each motion is predicted from its

@@ -48,7 +48,7 @@ fn unmasked(name: &str, given: &Bound<'_, PyAny>) -> PyResult<()> {
                 .unwrap_or(false) =>
         {
             Err(invalid(format!(
-                "{name} is a masked array: leave out what is masked, or fill it"
+                "{name} is a masked array: leave out masked values, or fill them"
             )))
         }
         _ => Ok(()),
@@ -242,7 +242,7 @@ pub(crate) fn kept<T: Element, D: Dimension>(
 ) -> Py<PyArray<T, D>> {
     let array = PyArray::from_owned_array(py, array);
     if let Ok(flags) = array.getattr("flags") {
-        // A new array accepts this, and the result would be correct without it.
+        // Setting this flag on a new array succeeds. The result would be correct without it.
         let _ = flags.setattr("writeable", false);
     }
     array.unbind()

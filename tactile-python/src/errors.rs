@@ -19,7 +19,7 @@ pyo3::create_exception!(
     tactile_imaging,
     TactileError,
     PyRuntimeError,
-    "Valid input without an answer: no contact, too few matches, a stage in Python that failed."
+    "Valid input without a result: no contact, too few matches, or a failed stage in Python."
 );
 
 /// The exception for an invalid argument.

@@ -429,7 +429,7 @@ pub(crate) fn strain_between(
 ) -> PyResult<StrainBetween> {
     if paired && (matcher.is_some() || options.is_some_and(|options| !options.is_empty())) {
         return Err(invalid(
-            "paired points take no matcher and no options of one",
+            "paired points need no matcher and no matcher options",
         ));
     }
     let sets = [
@@ -480,7 +480,7 @@ pub(crate) fn strain_series(
     let sets: Vec<_> = frames.iter().map(|frame| frame.as_array()).collect();
     let work = Work::new(matcher, options, measure, with_doubtful_pairs)?;
     let Some((&first, rest)) = sets.split_first() else {
-        return Err(invalid("frames must be one set of points at least"));
+        return Err(invalid("frames must contain at least one set of points"));
     };
     let mut axes = arrays::dimension(["frame 0", "frame 0"], [first; 2])?;
     for &next in rest {

@@ -88,7 +88,7 @@ impl Press {
                 .unwrap_or_else(|broken| broken.into_inner());
             if busy.contains(&here) {
                 return Err(errors::TactileError::new_err(
-                    "a stage asks the press that runs it, which waits for the stage",
+                    "a stage must not use the press that runs it, which waits for the stage",
                 ));
             }
             busy.push(here);

@@ -663,8 +663,9 @@ fn moved<const D: usize>(
         .iter()
         .map(|p| Point::from(linear * p.coords + shift))
         .collect();
-    // The error of the mean, and that of the other parameters of the map, which increases with the
-    // distance from the mean: each of D directions has an equal part of the spread.
+    // The error combines that of the mean and that of the other parameters of the map. The second
+    // increases with the distance from the mean. Each of D directions is assumed to have an equal
+    // part of the spread.
     let count = sources.len().max(1) as f64;
     let centre = sources.iter().map(|p| p.coords).sum::<SVector<f64, D>>() / count;
     let spread: f64 = sources

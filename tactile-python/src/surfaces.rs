@@ -201,7 +201,7 @@ pub(crate) fn depth(
     let table = arrays::columns::<2>("table", table)?;
     let table: Vec<(f64, f64)> = table.into_iter().map(Into::into).collect();
     let size = arrays::pixel_size(pixel_size)?;
-    // The depth follows from the table, whatever the object is.
+    // The depth follows from the table for any object.
     let unknown = rust::Object::Unknown {
         poisson_ratio: rust::Object::DEFAULT_POISSON_RATIO,
     };

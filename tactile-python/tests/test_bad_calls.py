@@ -1,4 +1,4 @@
-"""Bad calls are a clear exception, odd arrays the right answer."""
+"""Invalid calls raise a clear exception, and unusual arrays give the right result."""
 
 import numpy as np
 import pytest

@@ -32,7 +32,7 @@ def test_a_killed_worker_loses_nothing_and_a_second_run_goes_on(folder, tmp_path
     dataset.write([dataset.measure(folder, scene) for scene in scenes], tmp_path / "serial")
     serial = table(tmp_path / "serial")
     results = tmp_path / "results"
-    # Five were measured by a run that was stopped.
+    # Five scenes were measured by a run that was stopped.
     dataset.write([dataset.measure(folder, scene) for scene in scenes[:5]], results)
     local = LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)
     with local as cluster, Client(cluster) as client:

@@ -1,4 +1,4 @@
-"""The notebooks run and show what they hold, and the Python of the documentation runs as printed."""
+"""The notebooks run and reproduce their stored output, and the Python code of the documentation runs unchanged."""
 
 import os
 import re
@@ -14,7 +14,7 @@ ROOT = DATA.parents[1]
 
 
 def printed(notebook):
-    """The numbers that each cell shows."""
+    """The numbers in the output of each cell."""
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     texts = (output.get("text") or output.get("data", {}).get("text/plain", "") for output in outputs)
     return [[float(number) for number in re.findall(r"-?\d+\.?\d*(?:e[-+]?\d+)?", text)] for text in texts]
@@ -28,15 +28,15 @@ def test_a_notebook_shows_what_it_holds(path):
     client = NotebookClient(notebook, timeout=300, kernel_name="python3", resources=kept, record_timing=False)
     client.execute()
     if "RECORD_ANSWERS" in os.environ:
-        # Of the machine that ran it nothing is kept.
+        # Nothing about the machine is kept.
         notebook.metadata.pop("language_info", None)
         nbformat.write(notebook, path)
         return
     found = printed(notebook)
-    # Two digits: what is less was not looked at by anybody.
+    # Two digits are compared, because readers do not notice smaller differences.
     assert [len(cell) for cell in found] == [len(cell) for cell in stored]
     assert np.allclose(sum(found, []), sum(stored, []), rtol=0.05, atol=1e-9)
-    # What is committed is small.
+    # Committed notebooks are small.
     assert path.stat().st_size < 100_000
 
 

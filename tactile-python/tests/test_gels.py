@@ -11,7 +11,7 @@ ROWS, COLUMNS = 160, 200
 
 
 def half_space(x, y, radius, ball=BALL):
-    """Hertz: how far a ball in contact up to `radius` moves the face of a half-space, in pixels."""
+    """Hertz: displacement of the face of a half-space by a ball with contact radius `radius`, in pixels."""
     rows, columns = np.mgrid[:ROWS, :COLUMNS]
     rho = np.maximum(np.hypot(columns - x, rows - y) / radius, 1e-9)
     outside = np.maximum(rho, 1.0)
@@ -58,7 +58,7 @@ def test_a_press_has_the_depth_and_area_of_hertz(sensor):
     frame = sensor.read(lit(half_space(110, 70, 18, ball=60), 99))
     (contact,) = frame.contacts
     assert np.hypot(contact.x.value - 110, contact.y.value - 70) < 1
-    # Half of the depth lies below the rim.
+    # Half of the depth is below the rim.
     truth = PIXEL * 18**2 / 60
     assert contact.depth.value == pytest.approx(truth / 2, rel=0.1)
     assert contact.depth_below_far.value == pytest.approx(truth, rel=0.15)
@@ -135,7 +135,7 @@ def dots(shift):
     rows, columns = np.mgrid[:120, :160]
     x, y = columns - shift[0], rows - shift[1]
     near = np.hypot((x + 10) % 20 - 10, (y + 10) % 20 - 10)
-    # The lattice ends within the view.
+    # The whole lattice is visible.
     inside = (x > 15) & (x < 145) & (y > 15) & (y < 105)
     return np.where(inside & (near < 4.5), 60, 180).astype(np.uint8)
 

@@ -1,4 +1,4 @@
-"""Ctrl-C ends whatever is long."""
+"""Ctrl-C stops every long computation."""
 
 import signal
 import subprocess
@@ -15,7 +15,7 @@ import tactile_imaging as ti
 points = lambda n, seed=0: np.random.default_rng(seed).uniform(-1, 1, (n, 2))
 """
 
-# Each takes a minute or more to its end.
+# Without an interrupt each takes a minute or more.
 LONG = {
     "default": ("", "ti.match_points(points(3000), points(3000, 1))"),
     "labelling": ("", "ti.match_points(points(400), points(400, 1), 'relaxation-labelling')"),

@@ -1,4 +1,4 @@
-"""Splines against SciPy and matchers against the program."""
+"""Splines compared with SciPy, and matchers compared with the program."""
 
 import subprocess
 import sys
@@ -37,7 +37,7 @@ def test_the_jacobian_is_the_difference_quotient():
 
 
 def test_matches_have_the_bits_of_the_program(tmp_path):
-    # In a process of its own: the program takes the interrupt's handler.
+    # In a separate process, because the program installs an interrupt handler.
     command = [sys.executable, "-m", "tactile_imaging", "match", DATA / "cases.txt"]
     subprocess.run([*command, "--out", tmp_path], check=True, capture_output=True)
 
@@ -55,7 +55,7 @@ def test_matches_have_the_bits_of_the_program(tmp_path):
     for name, case in cases(DATA / "cases.txt").items():
         found = ti.match_points(case["m"], case["t"])
         assert np.array_equal(found.assignment, np.ravel(answers[name]["a"]))
-        # The program has the matcher's own warp: both are the deformation to within the noise.
+        # The program uses the warp of the matcher: both agree with the deformation within the noise.
         assert np.allclose(found.warped, answers[name]["w"], atol=found.sigma + 1e-8)
 
 
@@ -135,7 +135,7 @@ def test_hertz_forth_and_back():
         ti.Object.sphere(radius),
         estimator="sphere",
     )
-    # The same law: rounding alone.
+    # The same law, so that only rounding differs.
     assert found.value == pytest.approx(modulus, rel=1e-9)
 
 

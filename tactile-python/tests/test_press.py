@@ -1,4 +1,4 @@
-"""Presses and sessions: truth, the program's answers, threads, memory."""
+"""Presses and sessions: true values, results of the program, threads, memory."""
 
 import json
 import signal
@@ -27,7 +27,7 @@ def test_three_lines_to_the_modulus_of_the_default_press(scene):
 
 
 def program(*arguments):
-    """The program's JSON answer, in a process of its own."""
+    """The JSON output of the program, from a separate process."""
     command = [sys.executable, "-m", "tactile_imaging", *map(str, arguments), "--json"]
     return json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
 
@@ -35,7 +35,7 @@ def program(*arguments):
 def test_a_scene_file_has_the_bits_of_the_program():
     ours = ti.Press.from_scene(SCENE).measure()
     theirs = program("measure", SCENE)
-    # The program's have a sentence beside.
+    # Those of the program also have a sentence.
     for flag, caution in zip(ours.pop("flags"), theirs["cautions"], strict=True):
         assert caution.items() >= flag.items()
     # Its report has times.
@@ -53,7 +53,7 @@ def test_a_press_has_contact_surface_points_and_strain(scene):
     assert abs(contact.radius.value - radius) < 0.1 * scene.pixel_size[0]
     assert np.nanmax(press.surface(1).heights) > 0
     assert press.control_points(0).shape == (60, 3)
-    # Finite elements: the guide yields by 2.13 mm under 1.2 N.
+    # Finite elements: the guide is depressed by 2.13 mm under 1.2 N.
     depth, error = press.guide_depression(1, [0.0, 5e-3])
     assert abs(depth[0] - 2.134e-3) < 1.96 * error[0] and 0 < depth[1] < depth[0]
     found = press.matching(1)
@@ -85,7 +85,7 @@ def test_a_sensor_is_calibrated_saved_and_loaded(tmp_path):
 
 def test_depth_is_read_from_a_table():
     y, x = np.mgrid[:64, :64] - 32.0
-    # A ball of 4 mm, pressed 0.8 mm deep, 100 µm a pixel, 50 grey levels a millimetre.
+    # A ball of 4 mm, pressed 0.8 mm deep, with pixels of 100 µm and 50 grey levels per millimetre.
     ball = np.sqrt(np.maximum(16 - 0.01 * (x**2 + y**2), 0)) - 3.2
     depth = np.maximum(ball, 0)
     reference = np.full((64, 64), 200, np.uint8)
@@ -101,7 +101,7 @@ def test_a_lump_is_found():
     found = ti.inclusion_of_scene(DATA / "inclusion" / "scene.toml")
     (lump,) = found.lumps
     assert found.verdict == "found" and "diameter" in lump.identified and lump.x is None
-    # The block of the example is one of 5 kPa with a lump of 12 mm and 40 kPa, 4 mm deep.
+    # The block of the example has 5 kPa and contains a lump of 12 mm and 40 kPa, 4 mm deep.
     low, high = found.block_modulus.interval_95
     assert low < 5e3 < high
     truth = {"diameter": 12e-3, "depth": 4e-3, "youngs_modulus": 40e3}
@@ -154,12 +154,12 @@ def test_a_session_does_not_grow():
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
     before = push(1000)
-    # A frame has 5.7 kB: 9,000 that stayed would take 50 MB.
+    # A frame has 5.7 kB. If they were kept, 9,000 frames would take 50 MB.
     assert push(9000) - before < 4 << 10
 
 
 def test_the_keyboard_stops_a_long_match():
-    # Points strewn at random, which every start of the search is tried on.
+    # Random points, for which all starts of the search are tried.
     timer = threading.Timer(0.1, signal.raise_signal, [signal.SIGINT])
     timer.start()
     with pytest.raises(KeyboardInterrupt):
@@ -176,13 +176,13 @@ def test_a_press_is_drawn(scene, tmp_path):
 
 def test_presses_of_known_force_give_gain_and_layers(scene):
     pipeline, reference = ti.pipeline_of(scene, coupling_error=0.06), scene.reference
-    # The second frame is 1.2 N, and here stated as 1.3.
+    # The second frame has 1.2 N, but 1.3 N are stated.
     weight = ti.CheckPress.sample(scene.frames[1], 1.3, force_error=1e-3)
     press = pipeline.with_checks(reference, [weight]).press(reference)
     press.add_frame(scene.frames[1])
     force = press.contact(0).force
     assert abs(force.value / 1.3 - 1) < 1e-6 and force.standard_error < 0.02
-    # A ball as it is confirms the layers, and one far softer contradicts them.
+    # A correctly stated ball confirms the layers, and a much softer one contradicts them.
     ball = {"youngs_modulus": scene.truth["youngs_modulus"], "radius": 3e-3}
     known = ti.CheckPress.ball(scene.frames[1], 1.2, **ball)
     checked = pipeline.with_checks(reference, [known]).press(reference)

@@ -1,4 +1,4 @@
-"""Stages of one's own, each in a few lines, and what is wrong with some."""
+"""User-defined stages, each in a few lines, and faulty ones."""
 
 import numpy as np
 import pytest

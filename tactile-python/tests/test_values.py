@@ -74,7 +74,7 @@ def test_a_match_has_its_map_and_takes_other_points_along():
     assert np.all(np.abs(np.array(found.translation) - [3, 1]) < 4 * np.array(found.translation_error))
     for match in (found, ti.match_points(model, noisy)):
         places, errors = match.transform(queries)
-        # Four standard errors of 80 numbers, but for those that extrapolate a smooth field.
+        # Four standard errors for 80 numbers, except those that extrapolate a smooth field.
         assert np.median(np.abs(places - wanted) / errors[:, None]) < 1.5 and errors.max() < 0.1
     assert np.allclose(found.transform(queries)[0], homogeneous[:, :2], rtol=0, atol=1e-9)
 
@@ -172,7 +172,7 @@ def test_a_stage_that_holds_its_press_is_freed(scene):
     del own
     gc.collect()
     assert gone() is None
-    # A stage that nobody else holds lives as long as its press.
+    # A stage without other references lives as long as its press.
     press = ti.press_of(scene, matcher=Matcher())
     gc.collect()
     assert len(press.matching(1).pairs) > 100

@@ -607,7 +607,7 @@ pub(crate) fn finite_element_states(
     sphere: &ElasticSphere,
     waveguide: &LightGuide,
 ) -> Option<Vec<ContactState>> {
-    // Compared exactly: a body that differs at all was not computed.
+    // The comparison is exact, because contacts are tabulated only for identical bodies.
     let known = [Elastic::CL2000X, Elastic::CL2003X].contains(&sphere.material);
     let elastic = |w: &LightGuide| -> Vec<(f64, Elastic)> {
         w.layers

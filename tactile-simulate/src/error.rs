@@ -80,7 +80,7 @@ pub enum SimulateError {
     /// A frame of the calibration is too bright for the camera, so its sum would not be
     /// proportional to the force.
     #[error(
-        "at {force_n} N the indenter of the calibration saturates pixels of the camera: take a \
+        "at {force_n} N the indenter of the calibration saturates pixels of the camera: use a \
          larger indenter or a smaller force"
     )]
     CalibrationSaturates {

@@ -124,7 +124,7 @@ impl ContactState {
             return Err(unsolved(states.last().map_or(0.0, State::force_n)));
         }
         let of_state = |(state, &force_n): (&State, &f64)| Self {
-            // The solver reaches it within its tolerance.
+            // The solver reaches the force within its tolerance.
             force_n,
             ..Self::of_face(state, radius_m, faces)
         };

@@ -1,8 +1,8 @@
-//! The guide names every kind of caution, and a remedy for each.
+//! The guide lists every kind of caution with a remedy.
 
 use std::path::Path;
 
-/// The variants of an enum in the words of JSON, read from its source.
+/// The variants of an enum as named in JSON, read from its source.
 fn kinds<'a>(source: &'a str, name: &str) -> impl Iterator<Item = String> + 'a {
     let (_, rest) = source
         .split_once(&format!("pub enum {name} {{"))
@@ -20,7 +20,7 @@ fn kinds<'a>(source: &'a str, name: &str) -> impl Iterator<Item = String> + 'a {
     })
 }
 
-/// The words that a function `kind` returns.
+/// The kinds that a function `kind` returns.
 fn words(source: &str) -> impl Iterator<Item = String> + '_ {
     let (_, rest) = source.split_once("pub fn kind").expect("a kind");
     let (body, _) = rest.split_once("\n    }").expect("an end");
@@ -28,7 +28,7 @@ fn words(source: &str) -> impl Iterator<Item = String> + '_ {
     quoted.map(str::to_owned)
 }
 
-/// The kinds that the program warns of by itself, read from its sources.
+/// The kinds of cautions of the program itself, read from its sources.
 fn printed(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder)
         .unwrap()

@@ -126,7 +126,8 @@ impl Uses {
             }
         }
         let file_of = |mut path: Module| -> Module {
-            // A name passes through few re-exports. A name that its file defines ends here.
+            // A name passes through few re-exports. The search ends at the file that defines the
+            // name.
             for _ in 0..8 {
                 let file = (0..=path.len())
                     .rev()

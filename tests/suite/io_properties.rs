@@ -155,7 +155,7 @@ proptest! {
         }
     }
 
-    /// Whatever the values in tables, no result is NaN.
+    /// For any values in tables, no result is NaN.
     #[test]
     fn tables_go_into_what_they_are_read_for(edits in edits()) {
         prop_assert!(uses_of_tables(&[]).iter().all(Option::is_some));

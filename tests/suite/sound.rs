@@ -1,5 +1,5 @@
-//! Requirements for every press and stream, whatever its frames are: a typed error, a finite
-//! result, or a flag that names the cause; never a panic, never a silent NaN.
+//! Requirements for every press and stream with any frames: a typed error, a finite result, or a
+//! flag that names the cause; never a panic, never a silent NaN.
 use nalgebra::Point3;
 use ndarray::Array2;
 use std::fmt::Debug;

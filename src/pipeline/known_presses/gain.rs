@@ -33,7 +33,7 @@ impl GainCheck {
             return Err("its light is outside the calibration");
         }
         if !check.is_plausible() {
-            return Err("the measured force is not within half to twice the known one");
+            return Err("the measured force is not between half and twice the known force");
         }
         Ok(check)
     }

@@ -140,7 +140,7 @@ impl<M: Meter> Watch<M> {
         let percent = self.counts.late_percent(self.rows.len());
         if percent > allowed_late {
             context.note(format_args!(
-                "{percent:.1} % of the frames came late, more than {allowed_late} %"
+                "{percent:.1} % of the frames were late, more than {allowed_late} %"
             ));
         }
         Exit::complete_if(percent <= allowed_late)
@@ -246,7 +246,7 @@ pub(super) fn watch<M: Meter>(
             "frames_missing",
             json!({ "frames": missing }),
             format_args!(
-                "{missing} missing in the numbers of the frames' names: times are counted by the \
+                "{missing} missing in the numbers of the frames' names: times follow from the \
                  numbers"
             ),
         );

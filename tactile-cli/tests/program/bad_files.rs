@@ -1,11 +1,11 @@
-//! Files that no reader can use.
+//! Files that no reader accepts.
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::Command;
 
-/// Writes files of every kind of wrong into the folder; the names of those that are no image, and
-/// of those that are no table.
+/// Writes invalid files of every kind to the folder. Returns the names of files that are not
+/// images, and of files that are not tables.
 pub(crate) fn write(folder: &Path) -> (Vec<&'static str>, Vec<&'static str>) {
     let put = |name: &str, bytes: &[u8]| fs::write(folder.join(name), bytes).unwrap();
     let image = fs::read(folder.join("reference.png")).unwrap();
@@ -23,10 +23,10 @@ pub(crate) fn write(folder: &Path) -> (Vec<&'static str>, Vec<&'static str>) {
     let middle = wrong.len() / 2;
     wrong[middle..middle + 8].fill(0x55);
     put("crc.png", &wrong);
-    // A header that announces 30,000 × 30,000 pixels, and one beyond every size.
+    // One header announces 30,000 × 30,000 pixels, another an impossible size.
     put("bomb.pgm", b"P5\n30000 30000\n255\n");
     put("bomb_text.pgm", b"P2\n4000000000 4000000000\n255\n1 2 3\n");
-    // The signature of a PNG and its first chunk with the checksum: 60,000 × 60,000 pixels.
+    // The signature of a PNG and its first chunk with the checksum, for 60,000 × 60,000 pixels.
     put(
         "bomb.png",
         b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\xea\x60\0\0\xea\x60\x08\0\0\0\0\xa5\xb9\x2a\x9e",

@@ -1,4 +1,5 @@
-//! Gels that are lit in colours: calibrated, wrong circles named, and depth of the whole frame.
+//! Gels that are lit in colours: calibration, reports of wrong circles, and depth of the whole
+//! frame.
 use super::harness::{folder_with_examples, json, printed, text, value};
 use super::json::assert_keeps_to_schema;
 use super::streams::piped;
@@ -44,7 +45,7 @@ fn a_calibrated_gel_gives_depth_and_gradients() {
         (centre[0] - 58.0).hypot(centre[1] - 30.0) < 1.0,
         "{centre:?}"
     );
-    // The face counts from the gel far away.
+    // The depth of the face is measured from the gel far away.
     assert!(depth[30][58] > found && depth[80][110].abs() < 0.2 * depth[30][58]);
     assert!(x[30][50] > 0.1 && y[38][58] < -0.1);
     let labels = table("press_6_contact.csv");
@@ -58,7 +59,7 @@ fn a_calibrated_gel_gives_depth_and_gradients() {
         + header.len();
     assert_eq!(mesh.len() - at, 12 * 120 * 90 + 17 * 119 * 89);
     assert!(folder.path().join("made/press_6.npz").exists());
-    // A circle that is eight pixels off.
+    // This circle is wrong by eight pixels.
     let wrong = fs::read_to_string(folder.path().join(calibration)).unwrap();
     let wrong = wrong.replace("[86, 60, 15]", "[78, 60, 15]");
     let wrong = wrong.replace("= \"press", "= \"examples/data/colour/press");
@@ -78,7 +79,7 @@ fn a_calibrated_gel_gives_depth_and_gradients() {
     );
 }
 
-/// Frames that are not this sensor's are named, and have no number.
+/// Frames of other sensors are named and have no result.
 #[test]
 fn a_frame_of_others_is_not_read() {
     let folder = folder_with_examples();
@@ -105,7 +106,7 @@ fn a_frame_of_others_is_not_read() {
     }
 }
 
-/// The modulus is that of a known weight, and a press has the force of its depth.
+/// The modulus follows from a known weight, and the force of a press from its depth.
 #[test]
 fn a_known_weight_makes_forces() {
     let folder = folder_with_examples();
@@ -135,10 +136,10 @@ fn a_known_weight_makes_forces() {
         ["value", "standard_error"].map(|name| frame["force_n"][name].as_f64().unwrap())
     };
     let found = forces("made/sensor.toml");
-    // The weight itself, with the error of the weight and twice that of the depth.
+    // The force must be the weight, within the error of the weight and twice that of the depth.
     assert!((of(&found[0])[0] - 2.0).abs() < 1e-6, "{:?}", of(&found[0]));
     assert!(of(&found[0])[1] > 0.1);
-    // Contacts of one ball: the smaller, the less.
+    // For contacts of one ball, a smaller contact has a smaller force.
     for frame in &found[1..] {
         let wider = frame["contact"]["area_m2"].as_f64() > found[0]["contact"]["area_m2"].as_f64();
         assert_eq!(wider, of(frame)[0] > 2.0, "{frame}");
@@ -157,7 +158,7 @@ fn a_known_weight_makes_forces() {
     assert!((force - 2.0).abs() < 1e-6, "{rows}");
 }
 
-/// A camera's frames, as PPM images one after the other, have the answers of the files.
+/// Frames from a camera, as a sequence of PPM images, have the same results as the files.
 #[test]
 fn a_pipe_of_colours_gives_the_answers_of_the_files() {
     let folder = folder_with_examples();
@@ -178,7 +179,7 @@ fn a_pipe_of_colours_gives_the_answers_of_the_files() {
         &camera,
     );
     assert_eq!(live.status.code(), Some(0), "{}", text(&live.stderr));
-    // Times of files are counted by the numbers in their names, those of a pipe by its frames.
+    // Times of files follow from the numbers in their names, those of a pipe from its frames.
     let contacts = |of: &Value| [0, 1].map(|k| of["updates"][k]["contact"].clone());
     assert_eq!(contacts(&value(&live)), contacts(&measured));
     assert_eq!(value(&live)["updates"][1]["time_s"], 0.04);
@@ -198,7 +199,7 @@ fn a_pipe_of_colours_gives_the_answers_of_the_files() {
     }
 }
 
-/// One sentence for each, and what came before is kept.
+/// Each fault gives one sentence, and earlier results are kept.
 #[test]
 fn frames_without_colours_are_refused() {
     let folder = folder_with_examples();
@@ -228,7 +229,8 @@ fn frames_without_colours_are_refused() {
     assert_eq!(value(&output)["frames"], 1);
 }
 
-/// Neither layer nor modulus: forces of the same ball by what a gauge read, kept in the sensor file.
+/// Forces without layer and modulus: the sensor file stores a law from gauge readings, valid for
+/// the same ball.
 #[test]
 fn a_gauge_gives_forces_without_a_layer() {
     let folder = folder_with_examples();
@@ -236,7 +238,7 @@ fn a_gauge_gives_forces_without_a_layer() {
     let mut text = fs::read_to_string(folder.path().join(data).join("calibration.toml")).unwrap();
     text = text.replace("= \"press", &format!("= \"{data}press"));
     text = text.replace("\"reference.png\"", &format!("\"{data}reference.png\""));
-    // Contact radii in pixels: the force of a ball goes with their cube.
+    // Contact radii in pixels. The force of a ball is proportional to their cube.
     for (press, radius) in [(1, 16.0_f64), (3, 15.0), (4, 17.0), (5, 17.0)] {
         let force = 0.1 * (radius / 16.0).powi(3);
         text += &format!("\n[[gauge]]\nimage = \"{data}press_{press}.png\"\nforce_N = {force}\n");

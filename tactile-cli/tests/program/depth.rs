@@ -1,10 +1,10 @@
-//! Depth from a table: the grey that it is entered with, and where its depths are counted from.
+//! Depth from a table: the conversion to grey, and the zero of the depths.
 use super::harness::{run, value, words};
 use super::json::assert_keeps_to_schema;
 use std::fs;
 
-/// A frame of 40 × 40 pixels of grey 200, a stamp of 20 × 20 in the middle darker by this much in
-/// blue.
+/// A frame of 40 × 40 pixels with grey level 200. A square of 20 × 20 pixels in the middle is
+/// darker by this amount in blue.
 fn frame(blue: u8) -> Vec<u8> {
     let mut bytes = b"P6\n40 40\n255\n".to_vec();
     for at in 0..1600 {
@@ -20,7 +20,7 @@ fn the_grey_and_the_zero_are_those_of_the_table() {
     let put = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).unwrap();
     put("reference.ppm", &frame(0));
     put("pressed.ppm", &frame(90));
-    // A level is 30 µm deep, counted from where three levels were seen.
+    // A grey level corresponds to 30 µm, starting at a darkness of three levels.
     let rows = (3..60).map(|s| format!("{s},{}\n", 0.03 * f64::from(s - 3)));
     let table = format!("darkness,depth_mm\n{}", rows.collect::<String>());
     put("table.csv", table.as_bytes());
@@ -38,8 +38,8 @@ fn the_grey_and_the_zero_are_those_of_the_table() {
             .as_f64()
             .unwrap()
     };
-    // 90 levels of blue are 30 of the mean, 0.114 · 90 = 10.3 of Rec. 601 and 0.0722 · 90 = 6.5 of
-    // Rec. 709, of which frames of eight bits have 10 and 6.
+    // 90 levels of blue give 30 levels of the mean, 0.114 · 90 = 10.3 of Rec. 601 and 0.0722 · 90 =
+    // 6.5 of Rec. 709. Frames of eight bits have 10 and 6.
     for (options, expected) in [
         ("", 0.30),
         ("--grey rec601", 0.30),
@@ -50,14 +50,14 @@ fn the_grey_and_the_zero_are_those_of_the_table() {
         let found = depth_mm("table.csv", options);
         assert!((found - expected).abs() < 1e-9, "{options}: {found}");
     }
-    // The row 0, 0 states that depth was counted from no darkness.
+    // The row 0, 0 states that zero darkness means zero depth.
     for (options, expected) in [("--grey mean", 0.81), ("--grey mean --zero-table", 0.90)] {
         let found = depth_mm("from_flat.csv", options);
         assert!((found - expected).abs() < 1e-9, "{options}: {found}");
     }
 }
 
-/// A saddle beside a dome: slopes with a wrong sign or exchanged are those of no surface.
+/// A saddle beside a dome: slopes with a wrong sign, or exchanged, cannot belong to a surface.
 #[test]
 fn slopes_of_no_surface_are_named_and_normal_maps_integrated() {
     let folder = tempfile::tempdir().unwrap();
@@ -95,7 +95,7 @@ fn slopes_of_no_surface_are_named_and_normal_maps_integrated() {
             .map_or(String::new(), |caution| caution["text"].to_string());
         assert!(found.contains(words), "{found}");
     }
-    // The same as a normal map of 16 bits, its y up, with a margin of no normals.
+    // The same surface as a normal map of 16 bits, with y upwards and a margin without normals.
     let mut map = format!("P6\n{columns} {rows}\n65535\n").into_bytes();
     for (row, column) in (0..rows).flat_map(|r| (0..columns).map(move |c| (r, c))) {
         let [p, q] = slope(row, column);

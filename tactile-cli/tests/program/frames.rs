@@ -1,4 +1,4 @@
-//! Frames that do not fit their reference, that repeat one another, and many of them.
+//! Frames that do not fit their reference, repeated frames, and many frames.
 use super::harness::{folder_with_examples, run, text, value, words};
 use super::json::assert_keeps_to_schema;
 use serde_json::Value;
@@ -7,12 +7,12 @@ use std::path::Path;
 use std::process::Command;
 use tactile_files::io::{Grey, read_grey_image, write_colour_image, write_grey_image};
 
-/// The frames of the examples' press: without contact, at the lower and at the higher load.
+/// The frames of the example press: without contact, at the lower load and at the higher load.
 const REFERENCE: &str = "examples/data/press/reference.png";
 const LOWER: &str = "examples/data/press/frame_1.png";
 const HIGHER: &str = "examples/data/press/frame_2.png";
 
-/// The scene of the examples with other frames, all by their paths from the folder.
+/// The example scene with other frames, with all paths relative to the folder.
 fn scene(folder: &Path, name: &str, reference: &str, frames: &[impl AsRef<str>]) {
     let text = fs::read_to_string(folder.join("examples/data/press/scene.toml")).unwrap();
     let (head, rest) = text.split_once("[[frames]]").unwrap();
@@ -42,7 +42,7 @@ fn a_swapped_reference_is_named_as_one() {
     assert_eq!(code, Some(1));
     let error = value["youngs_modulus_pa"]["error"].as_str().unwrap();
     assert!(error.contains("were the two swapped"), "{error}");
-    // A frame without contact is not taken for one.
+    // A frame without contact must not be measured as a contact.
     scene(folder.path(), "empty.toml", REFERENCE, &[REFERENCE]);
     let (value, _) = measured(folder.path(), "empty.toml");
     let error = value["youngs_modulus_pa"]["error"].as_str().unwrap();
@@ -52,7 +52,8 @@ fn a_swapped_reference_is_named_as_one() {
     );
 }
 
-/// What is left out, or differs in its colours from the reference, is named and ends nothing.
+/// Files that are left out, or whose colours differ from the reference, are named, and the program
+/// continues.
 #[test]
 fn frames_that_do_not_fit_the_others_are_named() {
     let folder = folder_with_examples();
@@ -82,7 +83,7 @@ fn frames_that_do_not_fit_the_others_are_named() {
             "blue.png",
             "red_press.png",
             0,
-            "red and blue of red_press.png",
+            "exchanged between red_press.png",
         ),
         ("blue.png", "blue_press.png", 0, ""),
         (REFERENCE, "three.png", 0, ""),
@@ -134,7 +135,7 @@ fn a_sample_too_stiff_to_measure_has_a_bound_or_a_reason() {
     assert!(!printed.contains("above 0"), "{printed}");
 }
 
-/// Thousands of different frames in one scene take little memory and no more text than a line each.
+/// Thousands of different frames in one scene take little memory and at most one line of text each.
 #[test]
 fn thousands_of_frames_are_one_measurement() {
     const FRAMES: usize = 1_000;
@@ -143,16 +144,16 @@ fn thousands_of_frames_are_one_measurement() {
     let pressed = [LOWER, HIGHER].map(|path| read(path).to_u8());
     let names: Vec<String> = (0..FRAMES).map(|k| format!("{k}.pgm")).collect();
     for (k, name) in names.iter().enumerate() {
-        // A pixel of its own beyond the contact makes each a frame that no other repeats.
+        // One different pixel outside the contact makes each frame unique.
         let mut frame = pressed[k % 2].clone();
         let pixel = frame.iter_mut().nth(k / 2).unwrap();
         *pixel ^= 1;
         write_grey_image(folder.path().join(name), frame.view()).unwrap();
     }
     scene(folder.path(), "many.toml", REFERENCE, &names);
-    // Beside the program itself, a thousand results and the frames, which are kept up to 64 MB,
-    // take 53 MB of address space. A matrix of all loads would add 8 MB, a mask of each frame's
-    // contact 20 MB.
+    // In addition to the program, a thousand results and the frames, which are kept up to 64 MB,
+    // take 53 MB of address space. A matrix of all loads would add 8 MB, and a contact mask for
+    // each frame 20 MB.
     let program = env!("CARGO_BIN_EXE_tactile");
     let limit = fs::metadata(program).unwrap().len() / 1024 + 57_000;
     let output = Command::new("sh")

@@ -4,10 +4,10 @@ use std::ffi::OsStr;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-/// The largest address space that a call may take, in KiB: 8 GB.
+/// The largest address space of a call, in KiB: 8 GB.
 const ADDRESS_SPACE_KIB: u32 = 8 << 20;
 
-/// The program with these arguments in this folder, under a limit of its address space.
+/// Runs the program with these arguments in this folder, with a limited address space.
 pub(crate) fn tactile(folder: &Path, arguments: &[impl AsRef<OsStr>]) -> Command {
     let mut command = Command::new("sh");
     command
@@ -25,7 +25,7 @@ pub(crate) fn run(folder: &Path, arguments: &[impl AsRef<OsStr>]) -> Output {
     tactile(folder, arguments).output().expect("sh runs")
 }
 
-/// What a call prints that ends well.
+/// The output of a successful call.
 pub(crate) fn printed(folder: &Path, call: &str) -> String {
     let output = run(folder, &words(call));
     let errors = text(&output.stderr);
@@ -33,12 +33,13 @@ pub(crate) fn printed(folder: &Path, call: &str) -> String {
     text(&output.stdout)
 }
 
-/// The JSON object of a call.
+/// The JSON object printed by a call.
 pub(crate) fn value(output: &Output) -> Value {
     json(&text(&output.stdout)).unwrap_or_else(|e| panic!("{e}: {}", text(&output.stderr)))
 }
 
-/// What a call printed. Of JSON Lines the last is the answer, and those before it are its `updates`.
+/// The printed JSON of a call. In JSON Lines the last line is the result, and the lines before it
+/// are its `updates`.
 pub(crate) fn json(printed: &str) -> serde_json::Result<Value> {
     let mut lines: Vec<&str> = printed.lines().collect();
     if !lines
@@ -55,12 +56,12 @@ pub(crate) fn json(printed: &str) -> serde_json::Result<Value> {
     Ok(answer)
 }
 
-/// The words of a line of a shell, without quotes.
+/// The words of a shell command, without quotes.
 pub(crate) fn words(line: &str) -> Vec<&str> {
     line.split_whitespace().collect()
 }
 
-/// A folder in which the paths of the help lead to the examples' data.
+/// A folder in which the paths in the help lead to the example data.
 pub(crate) fn folder_with_examples() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples");

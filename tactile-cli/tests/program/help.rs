@@ -1,9 +1,9 @@
-//! Every example in the help runs, and its JSON keeps to the schema.
+//! Every example in the help runs, and its JSON conforms to the schema.
 use super::harness::{folder_with_examples, json, printed, words};
 use super::json::assert_keeps_to_schema;
 use std::collections::BTreeSet;
 
-/// The commands of a help's examples, without what explains them.
+/// The commands of the examples in a help text, without explanations.
 fn examples(help: &str) -> Vec<String> {
     let lines = help
         .lines()
@@ -18,7 +18,7 @@ fn help(arguments: &str) -> String {
     printed(folder.path(), arguments)
 }
 
-/// The subcommands that the help lists.
+/// The subcommands listed in the help.
 fn subcommands() -> Vec<String> {
     let help = help("--help");
     let list = help.split("Commands:").nth(1).expect("a list of commands");
@@ -33,7 +33,7 @@ fn subcommands() -> Vec<String> {
         .collect()
 }
 
-/// Runs an example for its JSON: lines of text are made too, and not printed.
+/// Runs an example with JSON output. The lines of text are computed too, but not printed.
 fn runs(example: &str) {
     let folder = folder_with_examples();
     let option = if example.contains("--json") {
@@ -44,14 +44,14 @@ fn runs(example: &str) {
     let printed = printed(folder.path(), &format!("{example}{option}"));
     let value = json(&printed).unwrap_or_else(|e| panic!("tactile {example}: {e}"));
     assert_keeps_to_schema(&value, example);
-    // Files go to --out and nowhere else.
+    // Files are written only to --out.
     let entries = std::fs::read_dir(folder.path()).unwrap();
     let left: BTreeSet<_> = entries.map(|e| e.unwrap().file_name()).collect();
     let expected = if example.contains("--out") { 2 } else { 1 };
     assert_eq!(left.len(), expected, "tactile {example} leaves {left:?}");
 }
 
-/// Other answers of the same subcommands.
+/// Other results of the same subcommands.
 const OTHER_ANSWERS: [&str; 4] = [
     "measure --ideal-camera",
     "calibrate examples/data/press/calibration.csv --there-and-back",

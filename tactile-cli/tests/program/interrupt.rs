@@ -1,4 +1,4 @@
-//! Ctrl-C ends every long subcommand soon, with what there is.
+//! Ctrl-C ends every long subcommand soon, with the results so far.
 use super::harness::{folder_with_examples, tactile, text, words};
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
@@ -6,7 +6,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Longest time from Ctrl-C to the end, on a busy machine: the work itself would go on for minutes.
+/// Longest time from Ctrl-C to the end on a busy machine. Without Ctrl-C the work would take
+/// minutes.
 const SOON: Duration = Duration::from_secs(30);
 
 /// Starts the program, sends it a signal (that of Ctrl-C is `-INT`) a moment after it has printed
@@ -30,8 +31,8 @@ fn ended_by(
             "tactile {arguments}: {printed}"
         );
     }
-    // The handler is there before anything is printed; without a line to wait for it takes a
-    // moment.
+    // The handler is installed before anything is printed. Without a line to wait for, the test
+    // waits a moment.
     std::thread::sleep(Duration::from_millis(700));
     let sent = Instant::now();
     let id = child.id().to_string();
@@ -57,16 +58,17 @@ fn ended_by(
     (printed, output.status.code())
 }
 
-/// Points whose match takes some seconds on a fast machine, in the tests' build: longer than the
-/// moment before Ctrl-C. More than 30,000 are refused for want of memory.
+/// Number of points whose match takes some seconds on a fast machine in the build of the tests,
+/// longer than the delay before Ctrl-C. More than 30,000 points are refused because of the memory
+/// limit.
 const LARGE: usize = 24_000;
 
 /// Angles of spirals in radians.
 const TURN: f64 = 2.4;
 const OTHER_TURN: f64 = 2.5;
 
-/// A spiral of points, each turned by this angle from the last. Spirals of other angles have nothing
-/// in common, so that a match of them takes long.
+/// A spiral of points, each rotated by this angle from the previous one. Spirals with different
+/// angles do not match, so that a match takes long.
 fn points(n: usize, turn: f64, row: &str) -> String {
     let point = |k: usize| {
         let angle = turn * k as f64;
@@ -95,7 +97,7 @@ fn matching_leaves_the_cases_that_are_done() {
     assert!(printed.starts_with("small: 40 of 40"), "{printed}");
     let answers = fs::read_to_string(folder.path().join("results/both.txt")).unwrap();
     assert!(answers.contains("case small") && !answers.contains("case large"));
-    // An earlier result is not replaced by one in part, nor is anything left beside it.
+    // A partial result must not replace an earlier one, and no other file may remain.
     let results = folder.path().join("results");
     let before = fs::read_dir(&results).unwrap().count();
     fs::write(results.join("both.txt"), "complete").unwrap();
@@ -112,7 +114,7 @@ fn matching_leaves_the_cases_that_are_done() {
 fn a_stream_ends_with_what_it_has_measured() {
     let folder = folder_with_examples();
     let call = "stream --rate 20 --period 60 --allowed-late 100 --out results";
-    // Making the frames is interrupted, then the frames that are there are not played.
+    // The simulation of frames is interrupted, so that no frames are played.
     let (printed, code) = ended_by("-INT", folder.path(), call, 0);
     assert_eq!(code, Some(130), "{printed}");
 }
@@ -126,7 +128,7 @@ fn work_that_has_nothing_yet_ends_at_once() {
     }
     for (call, lines) in [
         ("strain many.csv others.csv --out results", 0),
-        // The points are still being ordered.
+        // The interrupt arrives while the points are being ordered.
         ("warp many.csv many.csv many.csv --out results", 0),
         ("light --rays 9000000", 1),
         ("measure --repeat 4000", 0),

@@ -1,9 +1,10 @@
-//! Every JSON object keeps to `docs/json.schema.json`, by the few keywords that it uses.
+//! Every JSON object conforms to `docs/json.schema.json`. The checker supports only the keywords
+//! used there.
 use serde_json::Value;
 
 const SCHEMA: &str = include_str!("../../../docs/json.schema.json");
 
-/// Panics where the object is not as the schema and the rules of `docs/json.md` have it.
+/// Panics if the object violates the schema or the rules in `docs/json.md`.
 pub(crate) fn assert_keeps_to_schema(value: &Value, call: &str) {
     let schema: Value = serde_json::from_str(SCHEMA).unwrap();
     if let Err(reason) = check(value, &schema, &schema, "") {
@@ -12,7 +13,7 @@ pub(crate) fn assert_keeps_to_schema(value: &Value, call: &str) {
     numbers(value, call);
 }
 
-/// Whether a value is as a schema has it, and where it is not.
+/// Checks a value against a schema. An error names the place of the fault.
 fn check(value: &Value, schema: &Value, root: &Value, at: &str) -> Result<(), String> {
     for (keyword, rule) in schema.as_object().unwrap() {
         match keyword.as_str() {
@@ -47,7 +48,7 @@ fn check(value: &Value, schema: &Value, root: &Value, at: &str) -> Result<(), St
                 let choices = rule.as_array().unwrap().iter();
                 let tried: Vec<_> = choices.map(|c| check(value, c, root, at)).collect();
                 if tried.iter().all(Result::is_err) {
-                    // That of the right subcommand comes furthest.
+                    // An error that is not about `command` belongs to the right subcommand.
                     let reasons = tried.into_iter().filter_map(Result::err);
                     let longest = reasons.max_by_key(|reason| !reason.starts_with("/command"));
                     return Err(longest.unwrap_or_default());
@@ -72,7 +73,7 @@ fn has_type(value: &Value, name: &str) -> bool {
     }
 }
 
-/// Whatever has a value has its error and an interval around it.
+/// Every object with a value has its error and an interval around it.
 fn numbers(value: &Value, call: &str) {
     match value {
         Value::Object(object) => {

@@ -1,5 +1,4 @@
-//! The program `tactile` as a user meets it: what the help shows runs, and what is wrong is said in
-//! one sentence.
+//! Tests of the program `tactile`: the examples in the help run, and every error is one sentence.
 #![cfg(unix)]
 
 mod bad_calls;

@@ -1,4 +1,4 @@
-//! Results that cannot be written, and readers that go away.
+//! Results that cannot be written, and readers that close the pipe.
 use super::harness::{folder_with_examples, printed, run, tactile, text, value, words};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -71,8 +71,8 @@ fn what_ends_the_program_leaves_earlier_results_whole() {
     printed(folder.path(), &call);
     let results = folder.path().join("results");
     let before = files(&results);
-    // A limit of a file's size in blocks of 512 or 1024 bytes, by which the system ends a program:
-    // no result is as short.
+    // The system ends a program at this file size limit, in blocks of 512 or 1024 bytes. Every
+    // result is larger.
     let program = env!("CARGO_BIN_EXE_tactile");
     let limited = format!("ulimit -f 1; exec {program} {call}");
     let ended = Command::new("sh")
@@ -84,7 +84,7 @@ fn what_ends_the_program_leaves_earlier_results_whole() {
         files(&results) == before,
         "after a limit of the file's size"
     );
-    // Killed at some instants of a run of a fraction of a second.
+    // The program is killed at several instants of a run of a fraction of a second.
     for milliseconds in (0..120).step_by(8) {
         let quiet = || Stdio::null();
         let child = tactile(folder.path(), &words(&call))
@@ -95,8 +95,8 @@ fn what_ends_the_program_leaves_earlier_results_whole() {
         std::thread::sleep(Duration::from_millis(milliseconds));
         child.kill().unwrap();
         child.wait().unwrap();
-        // The same call gives the same files: each is there, and none beside them but for one that
-        // was whole and about to take its place.
+        // The same call writes the same files. Each must exist, and no other file may remain except
+        // a complete one that was about to replace an old one.
         let mut after = files(&results);
         after.retain(|name, bytes| {
             let is_whole = before.values().any(|whole| whole == bytes);
@@ -113,7 +113,7 @@ fn what_ends_the_program_leaves_earlier_results_whole() {
 #[test]
 fn a_stage_without_an_answer_does_not_hide_the_others() {
     let folder = tempfile::tempdir().unwrap();
-    // Three points show no error of an affine field.
+    // Three points do not determine the error of an affine field.
     let rows = "0,0\n1,0\n0,1\n";
     fs::write(folder.path().join("few.csv"), rows).unwrap();
     let output = run(
@@ -160,14 +160,14 @@ fn tables_of_a_strain_name_units_and_whole_rows() {
     }
 }
 
-/// A deformation that no matcher takes, in two files and as displacements, with a gap.
+/// A deformation that no matcher can solve, as two files and as displacements, with a gap.
 #[test]
 fn known_pairs_are_not_matched() {
     let folder = tempfile::tempdir().unwrap();
     let [mut before, mut after, mut both] = ["x,y\n", "x,y\n", "x,y,u,v\n"].map(str::to_owned);
     for k in 0..36 {
         let (x, y) = (f64::from(k % 6), f64::from(k / 6));
-        // Stretched by half and shifted beyond all neighbours.
+        // The points are stretched by half and shifted beyond all neighbours.
         let u = 0.5 * x + 100.0;
         let image = if k == 7 {
             "nan".into()
@@ -192,13 +192,13 @@ fn known_pairs_are_not_matched() {
         let mean = value["strain"]["components"]["e_xx"]["value"]
             .as_f64()
             .unwrap();
-        // ½ (1.5² − 1), and coordinates that are exact.
+        // The strain is ½ (1.5² − 1), with exact coordinates.
         assert!((mean - 0.625).abs() < 1e-6, "{value}");
         assert_eq!(value["match"]["pairs"], 35);
         assert_eq!(value["cautions"][0]["kind"], "skipped_rows", "{value}");
         let table = fs::read_to_string(folder.path().join("results/pairs.csv")).unwrap();
         assert!(table.lines().nth(8).unwrap().starts_with("8,8,"), "{table}");
-        // Stretched by half along x: nothing turns, areas grow by half.
+        // A stretch by half along x: there is no rotation, and areas grow by half.
         let medians = &value["strain"]["medians"];
         let near = |name: &str, expected: f64| {
             let found = medians[name]["value"].as_f64().unwrap();
@@ -231,7 +231,7 @@ fn known_pairs_are_not_matched() {
     );
 }
 
-/// Three files and more are followed: tracks, the strain of every step and since the first frame.
+/// Three or more files are followed: tracks, strain of every step and relative to the first frame.
 #[test]
 fn frames_of_a_series_give_tracks_and_strains() {
     let folder = tempfile::tempdir().unwrap();
@@ -241,12 +241,12 @@ fn frames_of_a_series_give_tracks_and_strains() {
             let x = f64::from(k % 7) + 0.05 * f64::from(k * k % 11);
             format!("{},{}\n", stretch * x, k / 7)
         };
-        // A point is missed in one frame.
+        // One point is missing in one frame.
         let seen = (0..49).filter(|&k| frame != 2 || k != 20);
         let rows: String = seen.map(row).collect();
         fs::write(folder.path().join(format!("{frame}.csv")), rows).unwrap();
     }
-    // Frames that a tracker left empty keep their numbers, in files and in one table.
+    // Empty frames of a tracker keep their numbers, both in files and in one table.
     let put = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
     put("none.csv", "x,y\n");
     put("gap.csv", "nan,nan\n");
@@ -277,8 +277,7 @@ fn frames_of_a_series_give_tracks_and_strains() {
         let found = &value["frames"][frame - 1];
         let mean = |part: &str| found[part]["components"]["e_xx"]["value"].as_f64().unwrap();
         let step: f64 = stretch / (stretch - 0.05);
-        // The positions are exact to rounding, and a homogeneous stretch is what a spline smooths
-        // to.
+        // The positions are exact within rounding, and a spline reproduces a homogeneous stretch.
         assert!(
             (mean("total") - 0.5 * (stretch * stretch - 1.0)).abs() < 1e-6,
             "{found}"
@@ -290,7 +289,7 @@ fn frames_of_a_series_give_tracks_and_strains() {
     }
     let read = |name: &str| fs::read_to_string(folder.path().join("results").join(name)).unwrap();
     assert!(read("tracks.csv").starts_with("track,frame,row,x,y\n0,1,0,"));
-    // The track of the point that was missed goes on.
+    // The track of the missing point continues.
     let track = read("tracks.csv")
         .lines()
         .filter(|l| l.starts_with("20,"))

@@ -7,7 +7,7 @@ use tactile_files::sensor::Sensor;
 use tactile_imaging::force::LocalCalibration;
 use tempfile::TempDir;
 
-/// The example's calibration under its own name, with one text replaced by another throughout.
+/// The example calibration under its own name, with all occurrences of one text replaced.
 fn calibration(from: &str, to: &str) -> TempDir {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/data/sensor");
     let folder = tempfile::tempdir().unwrap();
@@ -28,30 +28,31 @@ fn a_calibration_writes_a_sensor_and_a_report_and_says_what_was_learned() {
     let call = "calibrate calibration.toml --out made/sensor.toml --json";
     let value: serde_json::Value = serde_json::from_str(&printed(folder.path(), call)).unwrap();
     assert_keeps_to_schema(&value, "calibrate");
-    // The frames are those of a layer of 100 kPa whose maker states 95 ± 10 kPa.
+    // The frames belong to a layer of 100 kPa, for which 95 ± 10 kPa are stated.
     let modulus = &value["layers"][0];
     assert_eq!(modulus["parameter"], "youngs_modulus_pa");
     assert_eq!(modulus["identified"], true);
     let [fitted, error] =
         ["value", "standard_error"].map(|key| modulus["fitted"][key].as_f64().unwrap());
-    // Contact radii of 8 to 22 pixels, known to some hundredth of a pixel, and forces to 0.5 % or
-    // better; three standard errors.
+    // Contact radii of 8 to 22 pixels are accurate to some hundredths of a pixel, and forces to 0.5
+    // % or better. The tolerance is three standard errors.
     assert!(
         (fitted - 100e3).abs() < 3.0 * error && error < 2e3,
         "{fitted} ± {error}"
     );
-    // The bottom of the layer is ten contact radii away: the presses cannot tell its depth.
+    // The bottom of the layer is ten contact radii away, so that the presses do not determine its
+    // depth.
     assert_eq!(value["layers"][1]["identified"], false);
     let sensor = Sensor::read(folder.path().join("made/sensor.toml")).unwrap();
     assert_eq!(sensor.layers[0].youngs_modulus_pa, fitted);
-    // 0.012 grey levels a pascal, to the error that the curve states.
+    // The light is 0.012 grey levels per pascal, within the stated error of the curve.
     let pressure = sensor.curve.pressure_pa(120.0);
     assert!((pressure.value - 1e4).abs() < 4.0 * pressure.standard_error.max(25.0));
     let report = fs::read_to_string(folder.path().join("made/sensor.svg")).unwrap();
     assert!(report.contains("not identified, stays as stated"));
 }
 
-/// A change of the calibration, the call's end, and what the sentence says.
+/// A change of the calibration, the exit code of the call, and the expected sentence.
 const MISTAKES: [(&str, &str, &str, &str); 9] = [
     ("date = ", "date ", "", "calibration.toml"),
     ("gauge_error = 1e-3", "gauge_error = -1", "", "gauge_error"),
@@ -74,8 +75,8 @@ const MISTAKES: [(&str, &str, &str, &str); 9] = [
     ("", "", "--there-and-back", "branch"),
 ];
 
-/// What is wrong with how the calibration in this folder is refused; `None` where all is as it
-/// should be.
+/// A description of the fault in how the calibration in this folder is refused. `None` if there is
+/// none.
 fn complaint(folder: &Path, end: &str, says: &str) -> Option<String> {
     let before = fs::read_dir(folder).unwrap().count();
     let end = if end.is_empty() {

@@ -1,4 +1,4 @@
-//! Frames that come by a pipe.
+//! Frames from a pipe.
 use super::harness::{folder_with_examples, printed, tactile, text, value, words};
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -11,7 +11,7 @@ const SCENE: &str = "examples/data/press/scene.toml";
 const CALIBRATED: &str = "--reference examples/data/press/reference.png --pairs \
                           examples/data/press/calibration.csv --pixel-um 40 --json";
 
-/// Runs the program with these bytes on its standard input.
+/// Runs the program with these bytes as its standard input.
 pub(crate) fn piped(folder: &Path, call: &str, bytes: &[u8]) -> Output {
     let mut command = tactile(folder, &words(call));
     let mut child = command
@@ -22,7 +22,7 @@ pub(crate) fn piped(folder: &Path, call: &str, bytes: &[u8]) -> Output {
         .unwrap();
     let mut input = child.stdin.take().unwrap();
     let bytes = bytes.to_vec();
-    // The program may end before it has read all.
+    // The program may end before it has read all input.
     let writer = std::thread::spawn(move || drop(input.write_all(&bytes)));
     let output = child.wait_with_output().unwrap();
     writer.join().unwrap();
@@ -89,7 +89,7 @@ fn a_broken_pipe_keeps_what_was_measured() {
         let value = value(&output);
         let kept = value.pointer(frames).and_then(Value::as_array).unwrap();
         assert_eq!(kept.len(), 1, "{call}");
-        // Nothing at all, and no frame of the reference's size, are inputs that cannot be used.
+        // Empty input, and frames of another size than the reference, cannot be used.
         for bytes in [&b""[..], b"P5\n2 1\n255\nab"] {
             let output = piped(folder.path(), &call, bytes);
             assert_eq!(output.status.code(), Some(2), "{call}");
@@ -108,7 +108,7 @@ fn a_recording_is_measured_to_the_same_bits() {
         tactile(folder.path(), &words(&call)).output().unwrap()
     };
     let replayed = again("kept.y4m");
-    // A line of JSON for every frame, and the answer as the last.
+    // The output has a line of JSON for every frame, and the last line is the whole result.
     let printed = text(&replayed.stdout);
     let lines = printed
         .lines()
@@ -122,7 +122,7 @@ fn a_recording_is_measured_to_the_same_bits() {
     assert_eq!(value(&replayed)["updates"], value(&first)["updates"]);
     let answers = std::fs::read_to_string(folder.path().join("kept.csv")).unwrap();
     assert_eq!(answers.lines().count(), 3, "{answers}");
-    // What a run leaves that was killed in its second frame.
+    // These files remain if a run is killed in its second frame.
     let bytes = std::fs::read(folder.path().join("kept.y4m")).unwrap();
     std::fs::write(
         folder.path().join("killed.y4m"),
@@ -131,7 +131,7 @@ fn a_recording_is_measured_to_the_same_bits() {
     .unwrap();
     let killed = value(&again("killed.y4m"));
     assert_eq!(killed["updates"][0], value(&first)["updates"][0]);
-    // A recording replaces none.
+    // A recording does not replace an existing file.
     let refused = piped(folder.path(), &live, &video(folder.path()));
     assert_eq!(refused.status.code(), Some(2), "{}", text(&refused.stderr));
 }
@@ -157,7 +157,7 @@ fn a_report_is_one_page_that_changes_with_the_data_only() {
     ] {
         assert!(first.contains(part), "the page lacks {part}");
     }
-    // Nothing is fetched, and nothing runs but the script that turns the surface.
+    // The page loads nothing, and runs only the script that rotates the surface.
     assert_eq!(first.matches("<script").count(), 1);
     assert!(first.contains("script-src 'sha256-") && first.contains("data-relief="));
     for part in ["src=\"http", "url(", "@import", "<link", "<iframe"] {
@@ -210,7 +210,7 @@ fn browsers_of_this_computer_see_the_stream() {
     assert!(child.wait().unwrap().success());
 }
 
-/// A TIFF of one strip whose header states a size, and no sample.
+/// A TIFF with one strip whose header states a size, without samples.
 fn empty_tiff(columns: u32, rows: u32) -> Vec<u8> {
     let entries = [
         (256, columns),
@@ -233,7 +233,7 @@ fn empty_tiff(columns: u32, rows: u32) -> Vec<u8> {
     bytes
 }
 
-/// The header of an array of bytes of this shape.
+/// The header of a byte array with this shape.
 fn empty_npy(shape: &str) -> Vec<u8> {
     let mut header = format!("{{'descr': '|u1', 'fortran_order': False, 'shape': {shape}, }}");
     while (10 + header.len()) % 64 != 63 {
@@ -244,7 +244,7 @@ fn empty_npy(shape: &str) -> Vec<u8> {
     [b"\x93NUMPY\x01\0", &length[..], header.as_bytes()].concat()
 }
 
-/// The errors that a run wrote.
+/// The error output of a run.
 fn sentences(output: &Output) -> usize {
     let errors = text(&output.stderr);
     errors
@@ -256,7 +256,7 @@ fn sentences(output: &Output) -> usize {
 #[test]
 fn what_is_no_stream_is_refused_in_one_sentence() {
     let folder = folder_with_examples();
-    // The readers' own tests have all that can be wrong, and `bad_calls` damaged images.
+    // The tests of the readers cover other faults, and `bad_calls` covers damaged images.
     let frame = [b"FRAME\n", &video(folder.path())[..174 * 130]].concat();
     let piped_cases = [
         "YUV4MPEG2 W-174 H130 F80:1 Cmono\n",

@@ -93,7 +93,7 @@ pub fn parameter_slopes(
 fn log_stiffness_gradient(guide: &Waveguide, radius_m: f64) -> Option<DVector<f64>> {
     let layers = guide.layers();
     let count = PARAMETERS_PER_LAYER * layers.len();
-    // ν is at most ½, so its step is negative only.
+    // ν is at most ½, so only negative steps are used.
     let upper = |k: usize| if k < 2 * layers.len() { STEP } else { 0.0 };
     let moved = (0..count).map(|k| {
         let at = |value: f64| {

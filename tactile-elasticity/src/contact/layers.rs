@@ -446,9 +446,9 @@ impl LayerKernel {
 // = F (Σ, T) is propagated from the base to the surface, layer by layer: the growing waves dominate
 // numerator and denominator alike, and their ratio keeps its digits at every kh.
 //
-// If the touched layer is deep compared with the wave, 1 − L is small and would consist of rounding
-// alone. There the wave reflected by its lower face, e^(−2y) times a reflection coefficient, gives
-// 1 − L directly.
+// If the touched layer is deep compared with the wavelength, 1 − L is small and would be lost in
+// rounding. There the wave reflected by its lower face, e^(−2y) times a reflection coefficient,
+// gives 1 − L directly.
 
 /// A layer in units of the total thickness and of the top layer's shear modulus.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -76,7 +76,7 @@ fn short_waves_see_the_top_and_a_stiff_base_is_rigid() {
     let on_steel = kernel(&on_steel, Bond::Bonded);
     for s in [2.0, 7.0, 60.0] {
         let thin = closed_form(s * 0.2, 0.45, Bond::Bonded);
-        // Steel yields by 10⁻⁹ of the layer's displacement.
+        // Steel is displaced by 10⁻⁹ of the layer's displacement.
         assert!((on_steel.deficit(s) / thin - 1.0).abs() < 1e-7, "{s}");
     }
 }

@@ -68,9 +68,9 @@ impl FiniteStrain {
     /// ln(F/F_linear).
     pub(super) fn force(&self, contact: &LinearContact) -> Correction {
         let mut correction = FORCE.at(contact);
-        // The bulk of a confined body is compressed by the mean pressure, unlike that of a
-        // half-space: the term x (½ − ν)(γ + 2.3 β) leaves an error of 0.3 % on a flat for ν from
-        // 0.45 to ½, and of 1 % on layers from 0.47.
+        // The mean pressure compresses the bulk of a confined body, unlike that of a half-space.
+        // The term x (½ − ν)(γ + 2.3 β) leaves an error of 0.3 % on a flat for ν from 0.45 to ½,
+        // and of 1 % on layers from 0.47.
         let per_ball = (FITTED_POISSON_RATIO - self.poisson_ratio) * contact.ratio;
         let bulk = per_ball * (1.0 + 1.3 * contact.ball);
         correction.value += bulk;

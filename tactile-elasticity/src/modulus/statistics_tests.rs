@@ -68,7 +68,7 @@ fn a_shared_error_far_above_all_others_costs_no_digits() {
     let found = common_mean(&[1.0, 1.0 + 1e-9, 1.0 - 1e-9], &covariance).unwrap();
     assert_relative_eq!(found.mean.value, 1.0, max_relative = 1e-15);
     assert_relative_eq!(found.mean.standard_error(), 1.0, max_relative = 1e-12);
-    // Two residuals of one standard error each. z itself is rounded to 1e-16, a ten-millionth of
-    // the residuals.
+    // There are two residuals of one standard error each. z is rounded to 1e-16, which is a
+    // ten-millionth of the residuals.
     assert_relative_eq!(found.chi_squared, 2.0, max_relative = 1e-6);
 }

@@ -213,7 +213,7 @@ fn a_rising_gain_is_a_drift_and_a_falling_one_is_no_solid() {
     let gain = |per_s: f64| move |t: f64| (0.7 * (1.0 + per_s * t), 100e3 * (1.0 + per_s * t));
     for count in [5, 40] {
         let times = equal_times(count, 10.0);
-        // 10 % up and 20 % down, with errors of 1 %.
+        // The moduli rise by 10 % and fall by 20 %, with errors of 1 %.
         let up = counted(&times, gain(0.01), 0.0, 200);
         let down = counted(&times, gain(-0.02), 0.0, 200);
         assert_eq!(up, [0, 0, 200, 0], "{count} loads");

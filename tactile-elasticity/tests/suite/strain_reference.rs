@@ -69,7 +69,8 @@ fn every_measure_and_scalar_of_every_case() {
             (third, &stretches[2]),
         ] {
             let Some(e) = expected.as_f64() else { continue };
-            // A zero of the reference is an exact zero. Rounding may leave an ulp of one.
+            // A zero of the reference is an exact zero. Rounding may leave one unit in the last
+            // place.
             let gap = (found - e).abs() / if e == 0.0 { 1.0 } else { e.abs() };
             assert!(gap <= tol, "{id}: {found:e} for {e:e}");
         }

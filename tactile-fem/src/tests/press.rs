@@ -68,8 +68,8 @@ fn balls_on_guides_solve_to_contact_radii_beyond_their_own() {
                     2.0 / 3.0 * ring * (p * p + p * q + q * q) / (p + q)
                 })
                 .sum();
-            // The means behind the points carry it exactly. The difference is that between a
-            // parabola's arc and its chord.
+            // The underlying means carry it exactly. The difference is that between the arc of a
+            // parabola and its chord.
             assert!((carried / state.force_n() - 1.0).abs() < 3e-3, "{carried}");
             // It decreases from the axis to the edge, point by point.
             assert!(
@@ -171,8 +171,8 @@ fn a_soft_cylinder_on_a_flat_is_stiffer_than_a_free_column() {
         .states[0];
     let column = core::f64::consts::PI * radius_m * radius_m * modulus * strain;
     let ratio = state.force_n() / column;
-    // Glued at one end and ten radii long: the end that cannot spread adds a few per cent, the
-    // strain itself 0.1 %.
+    // The cylinder is glued at one end and ten radii long. The end that cannot spread adds a few
+    // per cent, and the strain itself 0.1 %.
     assert!((1.0..1.03).contains(&ratio), "{ratio}");
 }
 

@@ -41,7 +41,7 @@ const MOST_NAMED: usize = 10;
 ///   YUY2, Y800 and related formats the luma is taken; 24-bit colours are read too. Dropped frames
 ///   count for the times of later frames.
 /// - **NPY and NPZ** of NumPy: arrays of `uint8` or `uint16` in C order, of shape (rows, columns)
-///   or (frames, rows, columns), with 3 behind them for colours. An archive, or a pipe that
+///   or (frames, rows, columns), with a last axis of 3 for colours. An archive, or a pipe that
 ///   `numpy.save` writes to, may hold several arrays. Arrays of other number types in an archive
 ///   are skipped.
 /// - **TIFF**, one frame per page.

@@ -291,7 +291,7 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage, FileErro
     if !::image::guess_format(bytes).is_ok_and(|format| format.reading_enabled()) {
         let text = if bytes.is_empty() { "empty" } else { "a text" };
         let kind = kind_of(bytes).unwrap_or(text.into());
-        return Err(refused(path, format!("it is {kind}: an image is wanted")));
+        return Err(refused(path, format!("it is {kind}: an image is needed")));
     }
     if is_cut_jpeg(bytes) {
         return Err(refused(path, DAMAGED));
@@ -435,15 +435,15 @@ fn white_of(samples: &[u16], bytes: &[u8], bits: Option<u8>) -> Result<f64, Stri
         ));
     }
     // A program that stores 8 bits in 16 makes every sample a multiple of 257. Samples of a camera
-    // with 12 bits or fewer do not pass 4095.
+    // with 12 bits or fewer do not exceed 4095.
     let is_stretched = samples.iter().all(|sample| sample.is_multiple_of(257));
     if announced.is_some() || brightest > 4095 || is_stretched {
         return Ok(f64::from(u16::MAX));
     }
-    // Cameras of 10 bits do not pass 1023.
+    // Cameras of 10 bits do not exceed 1023.
     let likely = if brightest > 1023 { 12 } else { 10 };
     let bits = format!("give the bits of its camera (bits = {likely}, or 16)");
-    Err(format!("no sample of 16 bits is above {brightest}: {bits}"))
+    Err(format!("no 16-bit sample is above {brightest}: {bits}"))
 }
 
 /// The words in the header of a PGM, PPM or PAM, without comments.

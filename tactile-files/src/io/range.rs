@@ -88,7 +88,7 @@ pub(crate) fn pixel_size<'de, D: Deserializer<'de>, T: From<[f64; 2]>>(
     let [width, height] = <[Side; 2]>::deserialize(d)?.map(|side| side.0);
     if (width / height).max(height / width) > InputQuantity::MOST_UNEQUAL_SIDES {
         return Err(de::Error::custom(format_args!(
-            "sides of {width:e} and {height:e} m are those of no pixel: is one of them in another \
+            "a pixel cannot have sides of {width:e} and {height:e} m: is one of them in another \
              unit?"
         )));
     }

@@ -1,4 +1,4 @@
-//! What the documentation and the properties of `tests/suite/io_properties` do not show.
+//! Cases that are not covered by the documentation and by `tests/suite/io_properties`.
 use super::*;
 use ::image::{ImageBuffer, ImageFormat, Luma};
 use std::io::Cursor;
@@ -20,7 +20,7 @@ fn file(bytes: impl AsRef<[u8]>) -> File {
     }
 }
 
-/// The sentence about a file after its name, or after its folder.
+/// The error message about a file, without its name or folder.
 fn sentence<T: std::fmt::Debug>(result: Result<T, FileError>) -> String {
     let text = result.unwrap_err().to_string();
     let (_, end) = text.split_once("t.csv").unwrap();
@@ -68,7 +68,7 @@ fn a_folder_and_a_file_too_large_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let message = read_bytes(folder.path()).unwrap_err().to_string();
     assert!(message.ends_with("it is a folder, not a file: name the files in it"));
-    // A file of holes takes no room on the disk.
+    // A sparse file takes no space on the disk.
     let file = file("");
     let holes = std::fs::File::create(&file.path).unwrap();
     holes.set_len((512 << 20) + 1).unwrap();
@@ -102,7 +102,7 @@ fn quotes_marks_and_line_ends_of_other_programs_are_understood() {
     assert_eq!(table.values, ndarray::array![[1.0, 2.0]]);
 }
 
-/// Lines of a text of a file and the end of the sentence that refuses it.
+/// Lines of a file, and the end of the error message.
 fn refused<T: std::fmt::Debug>(read: fn(&str) -> Result<T, FileError>, cases: &str) {
     for case in cases.lines() {
         let (text, end) = case.split_once(" => ").unwrap();
@@ -179,7 +179,7 @@ fn sixteen_bits_keep_their_fraction() {
     assert_eq!(image.levels.as_slice().unwrap(), [256.0 / 257.0, 255.0]);
 }
 
-/// A dark frame of 8 bits that another program saved in 16.
+/// A dark frame of 8 bits that another program saved with 16 bits.
 #[test]
 fn eight_bits_stretched_to_sixteen_are_known() {
     let png = |samples: Vec<u16>| {
@@ -217,7 +217,7 @@ fn bits_given_beside_an_announced_largest_value_count_in_its_samples() {
     assert_eq!(sentence(grey(&bytes, Some(9))), end);
 }
 
-/// The frames of a stream and, where it breaks off, the sentence about it.
+/// The frames of a stream and, if it breaks off, the error message.
 fn frames_of(bytes: &[u8]) -> (Vec<ndarray::Array2<u8>>, Option<String>) {
     let mut frames = Vec::new();
     let mut frame = ndarray::Array2::default((0, 0));
@@ -275,7 +275,7 @@ fn anymaps() -> Vec<u8> {
     bytes
 }
 
-/// A TIFF of three pages, each its samples and its directory.
+/// A TIFF with three pages, each with its samples and its directory.
 fn pages(little_endian: bool) -> Vec<u8> {
     let end_for_end = |mut bytes: Vec<u8>| {
         if !little_endian {
@@ -523,7 +523,7 @@ fn what_is_no_table_is_named_with_its_remedy() {
     }
 }
 
-/// So many frames come of the bytes, then a sentence with these words.
+/// The bytes contain this number of frames, followed by an error with these words.
 fn breaks_off(bytes: &[u8], kept: usize, says: &str) {
     let (frames, broken) = frames_of(bytes);
     let sentence = broken.unwrap_or_default();
@@ -598,7 +598,7 @@ fn every_stream_gives_the_frames_that_went_in() {
     }
 }
 
-/// What came before the break is kept, and the break is one sentence.
+/// Frames before the break are kept, and the error is one sentence.
 #[test]
 fn a_stream_may_break_anywhere() {
     for bytes in [
@@ -625,7 +625,7 @@ fn a_stream_may_break_anywhere() {
     }
 }
 
-/// Whether a frame of the stream ends here.
+/// Whether a frame of the stream ends at this byte.
 fn is_between(bytes: &[u8], end: usize) -> bool {
     let rest = &bytes[end..];
     let starts = [&b"FRAME"[..], b"P5", b"\x93NUMPY"];

@@ -422,7 +422,7 @@ pub(super) fn cells(bytes: &[u8], path: &Path, skip_lines: usize) -> Result<Text
         table.notes.push("its decimal points are commas".into());
     }
     if further > 0 {
-        let note = format!("{further} further lines of headings are passed over");
+        let note = format!("{further} further lines of headings are skipped");
         table.notes.push(note);
     }
     Ok(table)

@@ -410,7 +410,8 @@ pub fn doubt_of_depths(rows: &[(f64, f64)]) -> Option<String> {
     // The films of such sensors are a few millimetres thick.
     let (_, depth) = rows.iter().find(|(_, depth)| *depth > 20e-3)?;
     Some(format!(
-        "a depth of {} mm is more than any film is thick: are the columns swapped, or is the unit \
+        "a depth of {} mm exceeds the thickness of any film: are the columns swapped, or is the \
+         unit \
          in the heading wrong?",
         1e3 * depth
     ))
@@ -432,7 +433,8 @@ pub fn doubt_of_pairs(pairs: &[CalibrationPair]) -> Option<String> {
     let [_, most] = InputQuantity::Force.limits();
     if let Some(force) = forces().find(|force| force.abs() > most) {
         return Some(format!(
-            "a force of {force:e} N is more than any sensor bears: are the columns swapped, or is \
+            "a force of {force:e} N exceeds what any sensor withstands: are the columns swapped, \
+             or is \
              the unit in the heading wrong?"
         ));
     }

@@ -558,7 +558,7 @@ impl SceneFile {
             let Some(time_s) = frame.time_s else { continue };
             if time_s < last_s {
                 let field = format!("frames[{}].time_s", index + 1);
-                let reason = format!("{time_s} s is before the frame that it follows ({last_s} s)");
+                let reason = format!("{time_s} s is before the preceding frame ({last_s} s)");
                 return Err(FileError::field(file, field, reason));
             }
             last_s = time_s;
@@ -576,7 +576,7 @@ impl SceneFile {
         // A named stage that would not run is refused as a mistake of the user.
         let by_table = matches!(calibration, CalibrationSource::DepthTable(_));
         if by_table && self.stages.reconstruction.is_some() {
-            let reason = "expected none: the depth table makes the surface";
+            let reason = "expected none: the surface comes from the depth table";
             return Err(error("stages.reconstruction", reason));
         }
         // The sensor file holds the pixel size, and its curve allows for drift of the lamps.
@@ -686,7 +686,7 @@ impl ObjectTable {
         let poisson_ratio = self.poisson_ratio.unwrap_or(Object::DEFAULT_POISSON_RATIO);
         let given = |field: &str, value: Option<f64>| {
             let missing = || {
-                let reason = "it is missing, and this shape needs it";
+                let reason = "it is missing, but this shape needs it";
                 FileError::field(file, format!("object.{field}"), reason)
             };
             value.ok_or_else(missing)
@@ -803,7 +803,7 @@ pub fn solve_contact_table(
         poisson_ratio,
     } = object.object(path)?
     else {
-        let reason = "expected a ball: contact tables are of balls";
+        let reason = "expected a ball: contact tables exist only for balls";
         return Err(FileError::field(path, "object.shape", reason));
     };
     let layers = waveguide.map_or_else(Vec::new, |waveguide| waveguide.0);

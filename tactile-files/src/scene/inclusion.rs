@@ -184,7 +184,7 @@ impl InclusionScene {
                 // previous one.
                 if frame.approach_m <= last_m {
                     let field = field(&format!("frames[{}].approach_m", frame_index + 1));
-                    let reason = "expected an approach greater than that of the frame before";
+                    let reason = "expected an approach greater than that of the preceding frame";
                     return Err(FileError::field(path, field, reason));
                 }
                 last_m = frame.approach_m;

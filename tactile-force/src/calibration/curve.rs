@@ -563,7 +563,7 @@ impl Problem {
     /// The smoothness with the smallest cross-validation error, and that error.
     fn cross_validated(&self) -> (f64, f64) {
         let count = self.rows.len();
-        // Groups left out in turn. With few frames, each group is one frame.
+        // Groups are left out in turn. With few frames, each group is one frame.
         let folds = count.min(10);
         let error = |smoothness: f64| {
             let mut squares = 0.0;
@@ -575,8 +575,8 @@ impl Problem {
             }
             (squares / count as f64).sqrt()
         };
-        // From a curve whose slope is a parabola in the root of the grey level to one that follows
-        // every frame.
+        // The tried curves range from one whose slope is a parabola in the root of the grey level
+        // to one that follows every frame.
         let mut best = (0.0, f64::INFINITY);
         for smoothness in [1000.0, 100.0, 10.0, 1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6] {
             let free = count as f64 - self.solve(smoothness, |_| true).effective;
@@ -584,7 +584,7 @@ impl Problem {
                 break;
             }
             let here = error(smoothness);
-            // Among equal errors, the smoother curve.
+            // If errors are equal, the smoother curve is chosen.
             if here < best.1 {
                 best = (smoothness, here);
             }

@@ -215,7 +215,7 @@ impl Loop for Gather<'_> {
         for run in aperture {
             let (row, start, end) = (run.row as usize, run.start as usize, run.end as usize);
             let [from, to] = self.taken[row];
-            // The run from which blocks were taken: only the remaining pixels on both sides.
+            // Only the pixels of the run on both sides of its blocks remain.
             if from < to && start <= from && to <= end {
                 self.pixels(row, start..from);
                 self.pixels(row, to..end);

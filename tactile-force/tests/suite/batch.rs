@@ -1,4 +1,4 @@
-//! A reused workspace gives the results of a new one, whatever it was used for before.
+//! A reused workspace gives the same results as a new one, for any previous use.
 
 use ndarray::{Array2, ArrayView2};
 use tactile_force::{

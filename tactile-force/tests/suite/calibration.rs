@@ -51,7 +51,7 @@ fn exact_data_are_recovered_to_rounding() {
     assert!((r.r_squared - 1.0).abs() < 1e-14);
     assert!(r.hysteresis.unwrap().greatest_n.abs() < 1e-14);
     assert_eq!(c.range(), [0.0, 4e6]);
-    // Through the origin, whatever the pairs are.
+    // The curve passes through the origin for any pairs.
     let forced = LinearCalibration::through_origin(&cycle(20, 5e-3, 9, line)).unwrap();
     assert_eq!(forced.force_n(0.0), 0.0);
 }

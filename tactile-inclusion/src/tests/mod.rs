@@ -181,8 +181,8 @@ fn the_answers_mesh_is_fine_enough() {
 
 #[test]
 fn a_block_said_to_be_incompressible_is_fitted_at_the_limit() {
-    // A prior above the limit that is narrow compared with its distance would pull against every
-    // step.
+    // A prior above the limit would oppose every step if it were narrow compared with its distance
+    // from the limit.
     let specimen = specimen().with_poisson_ratio(0.4999, 1e-4).unwrap();
     let search = InclusionSearch::new(specimen, guide()).unwrap();
     let start = search.known_block(5e3);

@@ -365,13 +365,13 @@ fn balls_above_the_detection_limit_are_found_and_those_below_are_not() {
     };
     let found = limits(&plain, contrast).unwrap();
     let limit = found[0][0];
-    // At larger depth a ball must be larger. Outside the used part no ball is searched.
+    // A deeper ball must be larger. Balls outside the used part are not searched.
     assert!(
         found[1][0] > limit && found[0][1].is_finite() && found[0][2].is_infinite(),
         "{found:?}"
     );
-    // The next press is next to this one, where it searches as much as any other position and is
-    // nearest, and not at the same position.
+    // The next press is beside this one and not at the same position. There it searches as much as
+    // at any other position, and it is the nearest such position.
     let next = |candidates: &[[f64; 2]]| {
         let nowhere = vec![vec![f64::INFINITY; places.len()]];
         search().next_position(&plain, &places, &nowhere, candidates)

@@ -1,4 +1,4 @@
-//! Linear assignment against brute force and against its own proof of optimality.
+//! Linear assignment compared with brute force, and checked by the conditions of optimality.
 
 use proptest::prelude::*;
 
@@ -17,8 +17,8 @@ fn total(costs: &[f64], columns: usize, assignment: &[Option<usize>]) -> f64 {
         .sum()
 }
 
-/// Every row to every column left, recursively: (pairs, cost) with the most pairs and then the
-/// least cost.
+/// Tries every row with every remaining column, recursively. Returns (pairs, cost) with the most
+/// pairs and, among these, the least cost.
 fn brute_force(
     costs: &[f64],
     rows: usize,
@@ -52,9 +52,9 @@ fn assert_distinct(assignment: &[Option<usize>], columns: usize) {
     }
 }
 
-/// `u_i + v_j <= c_ij`, equal on the chosen pairs, and no positive price on the longer side nor any
-/// price on a column left over: sufficient for optimality. Rounding: a price is a sum of up to
-/// `rows + columns` costs.
+/// The conditions are sufficient for optimality: `u_i + v_j <= c_ij` with equality for the chosen
+/// pairs, no positive price on the longer side, and no price on a remaining column. Rounding: a
+/// price is a sum of up to `rows + columns` costs.
 fn assert_optimal(search: &Search, costs: &[f64]) {
     let (rows, columns) = (search.column_of.len(), search.row_of.len());
     let scale = costs.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
@@ -84,7 +84,7 @@ fn assert_optimal(search: &Search, costs: &[f64]) {
 fn matrix(
     side: std::ops::RangeInclusive<usize>,
 ) -> impl Strategy<Value = (usize, usize, Vec<f64>)> {
-    // Few distinct values make ties, many make none.
+    // Few distinct values produce ties, many do not.
     let entry = prop_oneof![(0..4_i32).prop_map(f64::from), -1e3..1e3_f64];
     (side.clone(), side).prop_flat_map(move |(n, m)| {
         (
@@ -121,7 +121,7 @@ proptest! {
     fn forbidden_pairs_leave_the_least_cost((n, costs, forbidden) in (1..=6_usize).prop_flat_map(|n| (
         Just(n), prop::collection::vec(0.0..1.0_f64, n * n), prop::collection::vec(prop::bool::weighted(0.4), n * n)))
     ) {
-        // The diagonal stays allowed, so that every row can be served and the least cost is well
+        // The diagonal stays allowed, so that every row can be assigned and the minimum cost is
         // defined.
         let costs: Vec<f64> = (0..n * n).map(|k| if forbidden[k] && k % (n + 1) != 0 { f64::INFINITY } else { costs[k] }).collect();
         let found = assigned(&costs, n, n).unwrap();

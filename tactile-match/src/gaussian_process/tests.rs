@@ -100,7 +100,7 @@ fn modes_left_out_move_the_warp_by_less_than_a_tenth_of_the_noise() {
             }
         }
     }
-    // The ranks are truncated, the more the larger the noise.
+    // The ranks are truncated more strongly for larger noise.
     assert!(
         ranks[0] < ranks[1] && ranks[1] < ranks[2] && ranks[2] < 64,
         "{ranks:?}"

@@ -93,7 +93,7 @@ impl<const D: usize> Answer<D> {
         if self.risk(smaller, gain, tail) < 0.25 && state.ambiguity < MOST_AMBIGUOUS {
             return None;
         }
-        // So large a tail comes from a displaced part of the set.
+        // Such a large tail is caused by a displaced part of the set.
         let misfit = gain < MIN_TELLING_GAIN || tail > 0.08;
         Some(if misfit {
             Doubt::LargeResiduals
@@ -140,7 +140,7 @@ impl<const D: usize> Answer<D> {
         let logit = -0.61 + 7.1 * gain.min(1.0) + 4.1 * self.sureness() - 1.4 * few;
         let logistic = 0.96 / (1.0 + (-logit).exp());
         let (whole, power) = match doubt {
-            // Another answer fits the targets better. One pair in fifty is correct nevertheless.
+            // Another answer fits the targets better. Even so, one pair in fifty is correct.
             Doubt::Turned | Doubt::Mirrored => (0.02, 1.0),
             // Two or more answers fit equally well.
             Doubt::Symmetric | Doubt::Repeats { .. } => (0.5, 1.0),
@@ -488,8 +488,8 @@ impl PairOdds {
     /// Sums the odds of the changes that break each pair.
     fn add_odds<const D: usize>(&mut self, fitted: Fitted<'_, D>) {
         let pairs = self.partners.iter().flatten().count() as f64;
-        // Add half a point on either side: that none of a few is unpaired does not exclude that one
-        // is.
+        // Half a point is added to both counts. If none of a few points is unpaired, an unpaired
+        // point is still possible.
         let left_model = (self.partners.len() as f64 - pairs + 0.5) / (pairs + 0.5);
         let left_target = (fitted.targets.len() as f64 - pairs + 0.5) / fitted.annealer.volume;
         let scale = left_model * left_target * (TAU * fitted.variance).powf(0.5 * D as f64);

@@ -249,8 +249,8 @@ impl<const D: usize> FineFit<D> {
         self.system.solve(lambda(k));
         let sigma = self.system.noise();
         self.sigma = Some(sigma);
-        // Coordinates written with six digits round to more than this. A likelihood ratio to clean
-        // data below e⁵ decides nothing.
+        // Coordinates written with six digits have larger rounding errors. A likelihood ratio to
+        // clean data below e⁵ is not significant.
         let noisy = k > least + 1 && sigma > 1e-6 && energy < clean - 5.0;
         noisy.then_some((shape, lambda(k)))
     }

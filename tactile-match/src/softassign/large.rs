@@ -283,7 +283,7 @@ fn follow_patterns_of<const D: usize>(
         .fit(&mut ws.annealer, SCALES, sets, pairs, coarse);
     std::mem::swap(&mut ws.annealer.prior, &mut levels.sampled);
     // The patterns are accepted if at least this fraction of them lies within a spacing of one
-    // field. Of wrong candidates a sixteenth does.
+    // field. For wrong candidates the fraction is a sixteenth.
     let agreed = agreement(target, pairs, &coarse.warped, ws.spacing) >= 0.3;
     if agreed {
         levels.extend(&mut ws.annealer, 1, step, &mut ws.state);

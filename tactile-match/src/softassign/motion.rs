@@ -46,7 +46,7 @@ const APART: usize = 3;
 /// Fraction of the smaller set that a common motion of all points must pair.
 const COMMON: f64 = 0.6;
 /// Peaks of at least this fraction of the highest count as equal. For a lattice of 400 points the
-/// second peak has 95 %.
+/// second peak has 95 % of the height of the first.
 const EQUAL: f64 = 0.97;
 /// Rounds in which the motion of a block is refined with its pairs. Wrong targets among them slow
 /// the convergence: each round halves the error.

@@ -72,9 +72,9 @@ fn mirror<const D: usize>() -> SMatrix<f64, D, D> {
 }
 
 impl AnnealedSoftassign {
-    /// Searches for a better answer among the rotated, mirrored and shifted models. An allowed one
-    /// replaces the answer. Others that are better or equally good are stored in `ws.twin` and
-    /// `ws.repeats`.
+    /// Searches for a better answer among the rotated, mirrored and shifted models. An allowed
+    /// rival replaces the answer. Others that are better or equally good are stored in `ws.twin`
+    /// and `ws.repeats`.
     pub(super) fn look_for_rivals<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
         let few = ws.model.len().min(ws.target.len()) < 4 * D;
         if few || ws.best.trace.is_empty() || !self.has(Mechanism::Rivals) {

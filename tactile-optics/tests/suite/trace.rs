@@ -98,8 +98,8 @@ fn a_flat_layer_guides_what_unfolding_says_and_the_error_falls_faster_than_with_
 
 #[test]
 fn a_long_slab_keeps_the_trapped_share() {
-    // Light that enters within the acceptance angle is trapped. After 40 000 thicknesses, only rays
-    // within 1e-4 rad of that angle are left of the other light.
+    // Light that enters within the acceptance angle is trapped. After 40 000 thicknesses, all other
+    // rays have left, except those within 1e-4 rad of that angle.
     let layer = [SlabLayer {
         index: 1.35,
         thickness_m: 1e-3,
@@ -141,7 +141,7 @@ fn closed_forms_of_the_trapped_share() {
     // The projected solid angle of a strip of the unit disc.
     let disc = 2.0 / PI * (s.asin() + s * (1.0 - s * s).sqrt());
     assert!((led.trapped_share(acceptance, Geometry::Volume) - disc).abs() < 1e-11);
-    // A uniform LED in space: a zone of a sphere.
+    // A uniform LED in space illuminates a zone of a sphere.
     let even = Led::new(0.0, FRAC_PI_2).unwrap();
     assert!((even.trapped_share(acceptance, Geometry::Volume) - s).abs() < 1e-10);
     let dense = acceptance_angle(1.5, 1.0).unwrap();

@@ -57,7 +57,7 @@ _Frame = NDArray[np.uint8]
 _Mask = NDArray[np.bool_]
 _PixelSize = tuple[float, float]
 
-# The stages that a user may write: an object with the one method.
+# User-defined stages: an object with one method.
 
 class _Matcher(Protocol):
     def match_points(self, model: _Floats, target: _Floats, /) -> Any: ...

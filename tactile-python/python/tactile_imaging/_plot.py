@@ -1,4 +1,4 @@
-"""Plots, where matplotlib is installed."""
+"""Plots, which need matplotlib."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ import numpy as np
 
 
 class PressFrame:
-    """A frame of a press, `press[number]`, whose results are worked out when they are asked for."""
+    """A frame of a press, `press[number]`, whose results are computed on demand."""
 
     def __init__(self, press: Any, number: int) -> None:
         self.press, self.number = press, number
@@ -42,7 +42,7 @@ def _entry(value: Any, plain: Any) -> Any:
         return {name: _entry(entry, plain) for name, entry in value.items()}
     if plain and isinstance(value, (np.ndarray, np.generic)):
         return _entry(value.tolist(), plain)
-    # JSON has no number for what is not there.
+    # JSON has no number for a missing value.
     return None if plain and isinstance(value, float) and not np.isfinite(value) else value
 
 
@@ -68,7 +68,7 @@ _TUPLES = {"interval_95", "pixel_size", "origin"}
 
 
 def _from_entry(name: Any, value: Any) -> Any:
-    """A field of a result from what `to_dict` made of it."""
+    """A field of a result, restored from the output of `to_dict`."""
     if name == "grid" and isinstance(value, dict):
         return from_dict(importlib.import_module("tactile_imaging").StrainGrid, value)
     if isinstance(value, dict) and set(value) == {"value", "standard_error", "interval_95"}:

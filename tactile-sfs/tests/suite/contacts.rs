@@ -219,8 +219,8 @@ fn contact_points_lie_inside_the_contour() {
         for point in &points {
             let r2 = (point.y - centre[0]).powi(2) + (point.x - centre[1]).powi(2);
             let height = (radius * radius - r2).max(0.0).sqrt();
-            // Squares are interpolated linearly, with an error of at most a quarter of a squared
-            // pixel, and at the contour of its square root.
+            // Squares of heights are interpolated linearly, with an error of at most a quarter of a
+            // squared pixel. At the contour the error of the height is the square root of this.
             assert!((point.z * point.z - height * height).abs() < 1.0, "{point}");
         }
     }

@@ -13,7 +13,7 @@ fn paraboloid(radius: f32) -> (Array2<f32>, Array2<bool>, Array2<u8>) {
         let (x, y) = (c as f32 - 2047.5, r as f32 - 2047.5);
         (x * x + y * y) / (radius * radius)
     };
-    // Height 0.2 radius, and slope −0.4 ρ at ρ radii from the centre.
+    // The height is 0.2 radii, and the slope at ρ radii from the centre is −0.4 ρ.
     let z = Array2::from_shape_fn((N, N), |at| 0.2 * radius * (1.0 - square(at)));
     let mask = Array2::from_shape_fn((N, N), |at| square(at) < 1.0);
     let image = Array2::from_shape_fn((N, N), |at| {

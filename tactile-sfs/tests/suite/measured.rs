@@ -71,8 +71,8 @@ fn light_from_the_right_is_bright_on_the_right() {
         return;
     };
     let image = image::open(path).unwrap().into_luma8();
-    // Half way along the vase both flanks are in the frame. The direction of the light is (1, 0,
-    // 1).
+    // At half the height of the vase, both flanks are in the frame. The direction of the light is
+    // (1, 0, 1).
     let row: Vec<u8> = (0..128).map(|c| image.get_pixel(c, 64).0[0]).collect();
     let light = Lighting::new([1.0, 0.0, 1.0])
         .unwrap()

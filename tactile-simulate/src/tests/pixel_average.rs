@@ -61,7 +61,8 @@ fn the_sum_over_pixels_is_the_integral() {
         let hemisphere = disc.average(Profile::Hemisphere, window).values.sum() * 0.8;
         let paraboloid = disc.average(Profile::Paraboloid, window).values.sum() * 0.8;
         let (a2, eps) = (radius * radius, f64::EPSILON);
-        // The corners telescope. The remainder is the rounding of about a² pixels of size eps·a².
+        // The terms at common corners cancel. The remainder is the rounding of about a² pixels of
+        // size eps·a².
         assert!(
             (hemisphere / (2.0 / 3.0 * PI * a2) - 1.0).abs() < 1e3 * eps,
             "{hemisphere}"

@@ -17,7 +17,7 @@ pub(super) fn of_pairs<const D: usize>(
     let largest = largest_of(sources, targets);
     let multiple = |x: f64, grain: f64| {
         let steps = x / grain;
-        // Any number is nearly no step of a grain that is far larger.
+        // If the grain is far larger than a number, the number is close to zero steps.
         if steps.round() == 0.0 && x.abs() > f64::EPSILON * largest {
             return false;
         }

@@ -46,7 +46,7 @@ pub(super) fn contradicted<const D: usize>(
     let places: Vec<_> = suspects.iter().map(|&i| sources[i]).collect();
     let near = nearest_rows(sources, &places, NEIGHBOURS + 1);
     for (i, near) in suspects.into_iter().zip(near) {
-        // Next to a jump, a pair is far from the prediction but moves like those on its side.
+        // Next to a jump, a pair is far from the prediction but moves like the pairs on its side.
         let agrees = |&&j: &&usize| {
             let along = found[i].trend * (sources[i] - sources[j]);
             let apart = displacements[i] - displacements[j] - along;

@@ -1,5 +1,5 @@
-//! Randomly drawn worlds: every stated value is wrong by as much as its stated error allows, and
-//! the light or the camera departs from the assumptions in up to three respects.
+//! Randomly drawn worlds: every stated value is wrong by a draw from its stated error, and light
+//! and camera violate up to three assumptions.
 use super::worlds::{Check, Stated, World};
 use super::{Outcome, ball};
 use rand::{Rng, RngExt, SeedableRng, rngs::ChaCha8Rng, seq::IndexedRandom};
@@ -8,8 +8,8 @@ use tactile_imaging::pipeline::Flag;
 
 type Departure = (&'static str, fn(&mut World, f64));
 
-/// Departures of the light and the camera, as a function of a number from −1 to 1. An object with
-/// another reflectance is not among them, because the error of the coupling covers it.
+/// Violations of the assumptions about light and camera, as a function of a number from −1 to 1. An
+/// object with another reflectance is not among them, because the error of the coupling covers it.
 const DEPARTURES: [Departure; 10] = [
     ("lamps since the calibration", |w, x| {
         w.lamps = 1.0 + 0.1 * x
@@ -66,7 +66,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// Worlds with this check and this number of departures.
+/// Worlds with this check and this number of violated assumptions.
 fn draw(check: Option<Check>, departures: usize, count: u64) -> Vec<Outcome> {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut outcomes = Vec::new();

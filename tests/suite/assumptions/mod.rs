@@ -1,10 +1,9 @@
 //! What happens if the assumptions are wrong: the error of the modulus, its stated error, and
 //! whether the stated error was correct.
 //!
-//! Contacts are computed by finite elements at finite strain. A row departs from the assumptions of
-//! the default pipeline in one respect or in all. The interval of its result must contain the true
-//! value, or a flag about the modulus must name the cause, unless [`UNSEEN`] lists the row.
-//! modulus says what is wrong, or the row is one that [`UNSEEN`] names.
+//! Contacts are computed by finite elements at finite strain. A row violates one or all assumptions
+//! of the default pipeline. The interval of its result must contain the true value, or a flag about
+//! the modulus must name the cause, unless [`UNSEEN`] lists the row.
 #![allow(clippy::print_stdout)]
 mod drawn;
 mod worlds;
@@ -201,7 +200,7 @@ fn rows() -> Vec<Row> {
     ]
 }
 
-/// A small departure in every respect of the light and the camera.
+/// A small violation of every assumption about the light and the camera.
 fn all_of_it(world: &mut World) {
     world.exponent = 0.97;
     world.levels = [1.01, 0.99];
@@ -235,7 +234,7 @@ struct Outcome {
 }
 
 impl Outcome {
-    /// The outcome of a measurement, or of a refusal its sentence.
+    /// The outcome of a measurement. For a refusal it is the sentence.
     fn of(found: Result<Measurement, PipelineError>) -> Result<Self, PipelineError> {
         let found = found?;
         let modulus = found.youngs_modulus_pa?;

@@ -23,7 +23,7 @@ fn a_frame_that_is_given_twice_counts_once() {
     assert_eq!(loads.filter(|load| load.mean_strain.is_some()).count(), 1);
     let ratio = PaperRatio::default().estimate(&series).unwrap();
     assert_eq!(ratio.fit.observations, 1);
-    // So does a session.
+    // A session also counts it once.
     let mut session = Session::new(&pipeline, &[trial.simulation.reference.view()]).unwrap();
     for frame in trial.simulation.frames.iter().cycle().take(7) {
         session.push(frame.view()).unwrap();

@@ -39,7 +39,7 @@ fn tolerance(name: &str, _recorded: f64, largest: f64) -> f64 {
     } else {
         TOLERANCE
     };
-    // For two points and two constants, only the square of rounding remains.
+    // For two points and two constants, the residual is only the square of a rounding error.
     let floor = if name.ends_with("chi squared") {
         1e-20
     } else {

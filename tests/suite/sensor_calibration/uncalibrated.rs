@@ -177,7 +177,7 @@ fn table(seeds: u64) -> Vec<(&'static str, u32)> {
 
 #[test]
 fn an_effect_that_is_not_calibrated_for_stays_within_the_interval_or_is_flagged() {
-    // More in a study: SENSORS=3.
+    // A study uses more: SENSORS=3.
     let unseen = table(test_support::draws("SENSORS", 1));
     assert!(unseen.is_empty(), "{unseen:?}");
 }

@@ -20,7 +20,7 @@ pub(crate) fn small(table: &mut Table) {
             let truth = 0.5 * ((2.0 / 3.0) * step.ln_1p()).exp_m1();
             for (k, name) in ["xx", "yy", "zz"].into_iter().enumerate() {
                 let case = format!("step {step:.0e}, {what}: strain e_{name}");
-                // Equal within a rounding of one.
+                // The values agree within the rounding error of 1.
                 let tolerance = STRAIN[k] * share + truth + 4.0 * f64::EPSILON;
                 table.enter(&case, (found.strain[(k, k)] - truth).abs(), tolerance);
             }

@@ -157,6 +157,6 @@ fn shapes_that_fit_nothing_are_refused_or_their_interval_holds_the_truth() {
     }
     println!("{scenes} scenes, {refused} refused");
     assert_eq!(scenes, 8 * seeds);
-    // All except stars and rings that are specimens.
+    // All objects except stars and rings that are specimens.
     assert!(refused >= 6 * seeds, "{refused}");
 }

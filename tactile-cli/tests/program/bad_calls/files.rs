@@ -1,10 +1,10 @@
-//! The files that the calls name.
+//! The files used by the calls.
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::Command;
 
-/// Good inputs under short names.
+/// Valid inputs with short names.
 pub(super) fn good_files(folder: &Path) {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/data");
     for entry in fs::read_dir(&data)
@@ -38,7 +38,7 @@ layers = [{ thickness_m = 10e-3, youngs_modulus_pa = 60e3, poisson_ratio = 0.495
     .to_owned()
 }
 
-/// Files that the calls name, beside the good ones.
+/// Further files used by the calls, in addition to the valid ones.
 pub(super) fn more_files(folder: &Path) {
     let put = |name: &str, text: &str| fs::write(folder.join(name), text).unwrap();
     put("plain.csv", "x,y\n0,0\n1,0\n0,1\n1,1.5\n");
@@ -115,7 +115,7 @@ pub(super) fn more_files(folder: &Path) {
     let mut samples = b"P5\n48 48\n100\n".to_vec();
     samples.resize(samples.len() + 48 * 48, 200);
     fs::write(folder.join("above.pgm"), samples).unwrap();
-    // Results that are pipes, and links that lead out of their folder.
+    // Result paths that are pipes, or links that lead out of their folder.
     for name in ["pipes", "links", "links_in"] {
         fs::create_dir(folder.join(name)).unwrap();
     }
@@ -125,7 +125,7 @@ pub(super) fn more_files(folder: &Path) {
         symlink("../plain.csv", folder.join("links").join(name)).unwrap();
     }
     symlink("/dev/full", folder.join("links_in/pairs.csv")).unwrap();
-    // Tables under the names of results.
+    // Input tables with the names of result files.
     put(
         "named.toml",
         &scene.replace("calibration.csv", "stream.csv"),

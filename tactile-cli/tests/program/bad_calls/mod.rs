@@ -1,5 +1,5 @@
-//! A table of calls that cannot work: each ends with the right code and one sentence, and leaves
-//! everything as it was.
+//! A table of invalid calls: each ends with the right exit code and one sentence, and changes no
+//! file.
 mod files;
 
 use super::bad_files;
@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-/// Places where a file stands that must be an image, `@` for the file.
+/// Arguments that must be an image file, with `@` in place of the file.
 const IMAGES: [&str; 5] = [
     "force --reference @ --pairs calibration.csv --pixel-um 40 frame_1.png",
     "force --reference reference.png --pairs calibration.csv --pixel-um 40 @",
@@ -18,7 +18,7 @@ const IMAGES: [&str; 5] = [
     "integrate slope_x.csv slope_y.csv --mask @",
 ];
 
-/// Places where a file stands that must be a table.
+/// Arguments that must be a table.
 const TABLES: [&str; 9] = [
     "calibrate @",
     "match @",
@@ -31,13 +31,13 @@ const TABLES: [&str; 9] = [
     "depth --reference dark_reference.pgm --table @ --pixel-um 100 dark_frame.pgm",
 ];
 
-/// Lines of a file of cases, without the empty ones and those that explain.
+/// Lines of a file of cases, without empty lines and comments.
 fn lines(text: &str) -> impl Iterator<Item = &str> {
     text.lines()
         .filter(|line| !line.is_empty() && !line.starts_with('#'))
 }
 
-/// The calls of `calls.txt`, each with a text of its sentence.
+/// The calls of `calls.txt`, each with a part of the expected sentence.
 fn calls() -> Vec<(String, String)> {
     let mut calls = Vec::new();
     for line in lines(include_str!("calls.txt")) {
@@ -50,7 +50,7 @@ fn calls() -> Vec<(String, String)> {
     calls
 }
 
-/// The bytes of all regular files of the folder but the huge one.
+/// The bytes of all regular files in the folder except the huge one.
 fn state(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let entries = fs::read_dir(folder).unwrap().map(Result::unwrap);
     entries
@@ -68,13 +68,13 @@ fn state(folder: &Path) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
-/// What is wrong with how a call ended; `None` where all is as it should be.
+/// A description of the fault in how a call ended. `None` if there is none.
 fn complaint(folder: &Path, call: &str, says: &str) -> Option<String> {
     let arguments: Vec<&str> = call.split_whitespace().collect();
     let output = run(folder, &arguments);
     let (out, errors) = (text(&output.stdout), text(&output.stderr));
     let one_sentence = errors.lines().count() == 1 && errors.starts_with("tactile: ");
-    // Names of types and fields are for programmers.
+    // Messages must not contain names of types and fields, which are for programmers.
     let debug = ["panicked", "Error", "Some(", " { ", "unwrap", "Mismatch"];
     let wrong = if output.status.code() != Some(2) {
         format!("ended with {}", output.status)
@@ -96,7 +96,7 @@ fn complaint(folder: &Path, call: &str, says: &str) -> Option<String> {
     ))
 }
 
-/// Scenes with one text replaced, and the calls that read them.
+/// Scenes with one text replaced, and the calls that use them.
 fn edited(folder: &Path) -> Vec<(String, String)> {
     let scene = fs::read_to_string(folder.join("scene.toml")).unwrap();
     let mut calls = Vec::new();
@@ -146,7 +146,8 @@ fn every_bad_call_is_refused_in_one_sentence_and_changes_nothing() {
         for place in places {
             for file in files {
                 let is_case_file = place.starts_with("match");
-                // A matrix has any number of columns, and a point as many as the file has.
+                // A matrix may have any number of columns, and a point has as many coordinates as
+                // the file.
                 let fits =
                     place.starts_with("integrate") && matches!(*file, "wide.csv" | "infinite.csv");
                 if fits && !is_case_file {

@@ -236,8 +236,8 @@ fn twenty_thousand_loads_are_one_linear_regression() {
 }
 
 /// A ball on a layer that is thin relative to the contact, on a stiff base. There a plain iteration
-/// for the compliance of the guide oscillates between two values, and gave a reversed interval
-/// without its own estimate.
+/// for the compliance of the guide oscillates between two values, and once gave a reversed interval
+/// that did not contain its own estimate.
 #[test]
 fn a_thin_layer_on_a_stiff_base_has_an_interval_around_its_estimate() {
     let guide = guide(&[[1e-3, 100e3]], 0.495);

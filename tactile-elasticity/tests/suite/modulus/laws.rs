@@ -1,4 +1,5 @@
-//! Every law is its own inverse, reports where it is not valid, and is chosen where it is.
+//! The inverse of every law agrees with the law. A law reports the limits of its validity, and is
+//! chosen within them.
 
 use super::*;
 

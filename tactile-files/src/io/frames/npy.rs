@@ -114,7 +114,7 @@ struct Layout {
 
 impl Layout {
     const EXPECTED: &str = "an array of frames, uint8 or uint16 of shape (rows, columns) or \
-                            (frames, rows, columns), with 3 behind them for colours";
+                            (frames, rows, columns), with a last axis of 3 for colours";
 
     /// Reads the header of an array.
     fn read(input: &mut dyn Read) -> Result<Self, Broken> {
