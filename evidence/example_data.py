@@ -198,7 +198,7 @@ branch = "loading"
 indenter = {{ shape = "punch", radius_m = {TIP_M} }}
 """ for k, mass in enumerate(WEIGHTS_KG))
     head, _, tail = sensor_calibration().partition("\n[[presses]]")
-    head = head.replace("Two steel balls on a soft sensor of one layer: the layer has 100 kPa, its maker states 95 kPa.",
+    head = head.replace("Two steel balls on a soft sensor of one layer: the layer has 100 kPa, but 95 kPa are stated.",
                         "A flat tip of 1 mm radius under weights of 0.4 to 1.2 g, on the sensor of calibration.toml.")
     head = head.replace("gauge_noise_N = 2e-5\ncovers_N = [0.003, 0.02]", "gauge_noise_N = 1e-5")
     return head + presses + "\n" + tail[tail.index("[[layers]]"):]
@@ -218,7 +218,7 @@ force_N = {force + 2e-5 * error(k, 0.618034):.6f}
 branch = "{branch}"
 indenter = {{ shape = "ball", radius_m = {ball}, radius_error_m = 1e-6 }}
 """ for k, ball, force, branch in sensor_presses())
-    return f"""# Two steel balls on a soft sensor of one layer: the layer has 100 kPa, its maker states 95 kPa.
+    return f"""# Two steel balls on a soft sensor of one layer: the layer has 100 kPa, but 95 kPa are stated.
 date = "2026-11-22"
 temperature_c = 22.5
 references = ["reference.png"]

@@ -3,8 +3,8 @@
     python dataset_dask.py SCENES RESULTS                            # two processes of this machine
     python dataset_dask.py SCENES RESULTS --scheduler tcp://host:8786  # a cluster that sees SCENES
 
-Every `scene.toml` below SCENES is one row. What is in RESULTS is not measured again: a run that was
-stopped goes on where it was. A scene whose worker was killed is measured by another one.
+Every `scene.toml` below SCENES is one row. Scenes with results in RESULTS are not measured again, so that a stopped run continues.
+If a worker is killed, another one measures its scene.
 `pyarrow.parquet.read_table(RESULTS)` reads the whole.
 """
 
@@ -89,7 +89,7 @@ def run(client, folder, results, rows_per_file=100, scenes_per_task=20):
                 write(rows, results)
                 rows = []
     finally:
-        # What was measured is kept, whatever ended the run.
+        # Finished results are kept if the run ends early.
         if rows:
             write(rows, results)
     return len(scenes)
@@ -106,7 +106,7 @@ def main():
         with Client(given.scheduler) as client:
             count = run(client, given.scenes, given.results)
     else:
-        # One thread each: a process that is killed takes one task with it.
+        # One thread each, so that a killed process loses only one task.
         local = LocalCluster(n_workers=given.workers, threads_per_worker=1, dashboard_address=None)
         with local as cluster, Client(cluster) as client:
             count = run(client, given.scenes, given.results)

@@ -32,7 +32,7 @@ use tactile_imaging::pipeline::{interval_text, with_error};
 /// flatter or taller than a ball; its diameter is that of the ball of equal volume. The result is
 /// whether there is a lump, and its position, diameter, depth, modulus and height over width with
 /// 95 % intervals. Parameters that the frames do not determine are named. --out gets profiles.csv
-/// and inclusion.svg. A search takes about seven seconds for each kind of interface.
+/// and inclusion.svg. A search takes several seconds.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
