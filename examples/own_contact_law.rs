@@ -19,7 +19,7 @@ impl ContactLaw for Ball {
                 let force_over_modulus = 4.0 / 3.0 * a.powi(3) / self.radius_m;
                 Reach::At(LogForce::new(force_over_modulus.ln()))
             }
-            ContactLength::Indentation(_) => Reach::NotMine,
+            _ => Reach::NotMine,
         }
     }
 

@@ -1,7 +1,7 @@
 //! The surface of the guide under a contact.
 use super::contact::ContactReading;
 use crate::core::Estimate;
-use crate::elasticity::contact::{Bond, Waveguide, depression_m};
+use crate::elasticity::contact::{Bond, Waveguide};
 use crate::elasticity::modulus::Bodies;
 
 /// Relative standard error of the depth because of large strain: this factor times depth over
@@ -34,7 +34,9 @@ pub(super) fn depths(
     let places: Vec<f64> = std::iter::once(0.0)
         .chain(distances_m.iter().copied())
         .collect();
-    let found = depression_m(guide, Bond::Bonded, force.value, radius.value, &places).ok()?;
+    let found = guide
+        .depression_m(Bond::Bonded, force.value, radius.value, &places)
+        .ok()?;
     let (&greatest, asked) = found.split_first()?;
     // On a half-space the depth on the axis is proportional to 1/a. On layers and off the axis it
     // varies less.

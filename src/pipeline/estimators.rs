@@ -32,10 +32,8 @@ fn default_of(
             ..
         } => BondedLayer::new(indenter_radius_m, thickness_m, nu, Bond::Bonded).and_then(shared),
         Object::Cone { half_angle_rad, .. } => shared(Cone::new(half_angle_rad, nu)?),
-        Object::Block { .. } | Object::Cylinder { .. } | Object::Unknown { .. } => {
-            shared(StressStrainRegression::default())
-        }
         Object::FlatPunch { .. } => shared(paper_ratio(object)?),
+        _ => shared(StressStrainRegression::default()),
     }
 }
 
@@ -58,7 +56,7 @@ pub(super) fn that_fit(
             Object::Layer { .. } | Object::Cone { .. } => {
                 estimators.push(default_of(object, waveguide)?);
             }
-            Object::Block { .. } | Object::Cylinder { .. } | Object::Unknown { .. } => {}
+            _ => {}
         }
         estimators.push(shared(StressStrainRegression::default())?);
         Ok(estimators)

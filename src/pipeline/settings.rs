@@ -5,7 +5,7 @@ use super::reference_light::ReferenceLight;
 use super::specimen::Object;
 use crate::core::{InvalidOption, Requirement, Source, Uncertain};
 use crate::elasticity::ElasticityError;
-use crate::elasticity::contact::{PARAMETERS_PER_LAYER, Waveguide};
+use crate::elasticity::contact::{Layer, Waveguide};
 use crate::elasticity::modulus::Bodies;
 use crate::sfs::Binning;
 use nalgebra::{DMatrix, DVector};
@@ -191,7 +191,7 @@ impl Settings {
         self.layer_covariance.clone().unwrap_or_else(|| {
             // A common factor of all moduli, whose logarithms come first.
             let variance = self.assumptions.error(Source::Guide).powi(2);
-            let parameters = PARAMETERS_PER_LAYER * layers;
+            let parameters = Layer::PARAMETERS * layers;
             DMatrix::from_fn(parameters, parameters, |i, j| match i.max(j) < layers {
                 true => variance,
                 false => 0.0,
@@ -232,7 +232,7 @@ impl Settings {
         }
         self.assumptions.check()?;
         let layers = self.waveguide.as_ref().map_or(0, |w| w.layers().len());
-        let parameters = PARAMETERS_PER_LAYER * layers;
+        let parameters = Layer::PARAMETERS * layers;
         let sized = |name, found: usize| match found == parameters {
             true => Ok(()),
             false => Err(InvalidOption::new(name, found as f64, THREE_PER_LAYER)),

@@ -5,9 +5,7 @@ use super::flag::Flag;
 use super::strain::PairStrain;
 use crate::elasticity::field::StrainField;
 pub use crate::elasticity::modulus::Object;
-use crate::elasticity::modulus::{
-    Estimate, LoadSeries, LoadState, UniaxialLoads, neo_hookean_excess,
-};
+use crate::elasticity::modulus::{Estimate, LoadSeries, LoadState, UniaxialLoads};
 use crate::elasticity::strain::StrainMeasure;
 use crate::force::{FaceReading, ShapeProblem};
 use nalgebra::Matrix3;
@@ -30,10 +28,7 @@ impl Specimen {
                 poisson_ratio,
                 stated: !matches!(object, Object::Unknown { .. }),
             }),
-            Object::Sphere { .. }
-            | Object::FlatPunch { .. }
-            | Object::Layer { .. }
-            | Object::Cone { .. } => Self::Curved,
+            _ => Self::Curved,
         }
     }
 }
@@ -144,7 +139,7 @@ pub(super) fn material_law(measure: &dyn StrainMeasure, strain: f64) -> Option<F
     if strain == 0.0 || strain.is_nan() {
         return None;
     }
-    match neo_hookean_excess(measure, strain) {
+    match UniaxialLoads::neo_hookean_excess(measure, strain) {
         Ok(excess) if excess.abs() > LARGEST_EXCESS => Some(Flag::MaterialLaw { strain, excess }),
         Ok(_) => None,
         Err(_) => Some(Flag::MaterialLawNotJudged { strain }),

@@ -9,7 +9,7 @@ use super::report::{Report, SkipReason, Stage};
 use super::specimen::{Object, Specimen};
 use super::strain::PairStrain;
 use super::surface::{self, ContactSurface, ContactSurfaceWorkspace, ControlPoints};
-use crate::elasticity::field::mean_strain_error;
+use crate::elasticity::field::StrainField;
 use crate::elasticity::modulus::{
     Estimate, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator, Warning,
 };
@@ -489,7 +489,7 @@ impl StrainWorkspace {
             .map_err(|source| PipelineError::Strain { from, to, source })?;
         strain.measure = measure.name();
         strain.summary = strain.field.summary();
-        let noise = mean_strain_error(
+        let noise = StrainField::mean_error(
             &self.sources,
             &self.targets,
             matched.model.grid_m,

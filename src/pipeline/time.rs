@@ -1,8 +1,9 @@
 //! Change of the modulus over the time of a press.
 use super::text::{decimals_of, fixed, interval_text, with_error};
+use crate::core::Interval;
 use crate::core::Source;
-use crate::elasticity::modulus::{Estimate, Interval, LoadSeries, ModulusEstimator};
-use crate::elasticity::relaxation::{TimeDependence, TimedModulus, time_dependence};
+use crate::elasticity::modulus::{Estimate, LoadSeries, ModulusEstimator};
+use crate::elasticity::relaxation::{TimeDependence, TimedModulus};
 use std::fmt::{self, Display, Formatter};
 
 /// The time range of a modulus, and its change in that range.
@@ -151,7 +152,7 @@ fn result(moduli: &[TimedModulus], scale_error: f64, law_error: f64) -> Option<T
     let [first, .., last] = moduli else {
         return None;
     };
-    let change = time_dependence(moduli, scale_error, law_error).ok()?;
+    let change = TimeDependence::of(moduli, scale_error, law_error).ok()?;
     Some(TimeResult {
         from_s: first.time_s,
         to_s: last.time_s,

@@ -21,6 +21,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct StrainSummary {
     /// Weighted mean.
     pub mean: Matrix3<f64>,
@@ -202,66 +203,68 @@ impl StrainField {
 // Distance, in pixels of the surfaces, between the edge of a mask and that of the contact.
 const EDGE_PX: f64 = 0.5;
 
-/// Standard errors of the mean Green–Lagrange strain between matched points of two reconstructed
-/// surfaces.
-///
-/// `grid_m` is the pixel size of the surfaces in metres. `run_length` is the number of consecutive
-/// neighbours that share the errors of a surface. O(n).
-///
-/// ```
-/// use nalgebra::Point3;
-/// use tactile_elasticity::field::mean_strain_error;
-///
-/// // A dome that grows by a fifth. The edges of both contacts are known to half a pixel.
-/// let dome: Vec<_> = (0..100)
-///     .map(|i| {
-///         let (z, angle) = (1.0 - f64::from(i) / 100.0, 2.4 * f64::from(i));
-///         let r = (1.0 - z * z).sqrt();
-///         Point3::new(r * angle.cos(), r * angle.sin(), z)
-///     })
-///     .collect();
-/// let grown: Vec<_> = dome.iter().map(|p| p * 1.2).collect();
-/// assert!(mean_strain_error(&dome, &grown, 0.0, 10).amax() < 1e-10);
-/// assert!(mean_strain_error(&dome, &grown, 0.1, 10)[(2, 2)] > 0.005);
-/// ```
-pub fn mean_strain_error(
-    sources: &[Point3<f64>],
-    targets: &[Point3<f64>],
-    grid_m: f64,
-    run_length: usize,
-) -> Matrix3<f64> {
-    let [from, to] = [sources, targets].map(Disc::of);
-    let offsets = || pairs_of(sources, targets, [&from, &to]);
-    let spread: Matrix3<f64> = offsets().map(|(d, _)| d * d.transpose()).sum();
-    // Directions that the points do not span are undetermined. A small multiple of the identity
-    // keeps the inverse finite.
-    let inverse = (spread + Matrix3::identity() * (1e-12 * spread.trace())).try_inverse();
-    let Some(inverse) = inverse else {
-        return Matrix3::zeros();
-    };
-    let slope = offsets()
-        .map(|(d, t)| t * d.transpose())
-        .sum::<Matrix3<f64>>()
-        * inverse;
-    let gradient = clustered(offsets(), run_length, &slope, &inverse);
-    let along = |k: usize| slope.column(k).norm();
-    let edge = EDGE_PX * grid_m * (from.radius.recip() - to.radius.recip()).abs();
-    let residual: Vector3<f64> = offsets()
-        .map(|(d, t)| t - slope * d)
-        .map(|r| r.component_mul(&r))
-        .sum();
-    // Both surfaces have the same errors, in the units of the first.
-    let dilution = |k: usize| residual[k] * inverse[(k, k)] / (1.0 + along(k).powi(2));
-    Matrix3::from_fn(|j, k| {
-        if j == k {
-            let square = along(j).powi(2);
-            (along(j) * gradient[(j, j)])
-                .hypot(square * edge)
-                .hypot(square * dilution(j))
-        } else {
-            0.5 * (along(j) * gradient[(j, k)]).hypot(along(k) * gradient[(k, j)])
-        }
-    })
+impl StrainField {
+    /// Standard errors of the mean Green–Lagrange strain between matched points of two reconstructed
+    /// surfaces.
+    ///
+    /// `grid_m` is the pixel size of the surfaces in metres. `run_length` is the number of consecutive
+    /// neighbours that share the errors of a surface. O(n).
+    ///
+    /// ```
+    /// use nalgebra::Point3;
+    /// use tactile_elasticity::field::StrainField;
+    ///
+    /// // A dome that grows by a fifth. The edges of both contacts are known to half a pixel.
+    /// let dome: Vec<_> = (0..100)
+    ///     .map(|i| {
+    ///         let (z, angle) = (1.0 - f64::from(i) / 100.0, 2.4 * f64::from(i));
+    ///         let r = (1.0 - z * z).sqrt();
+    ///         Point3::new(r * angle.cos(), r * angle.sin(), z)
+    ///     })
+    ///     .collect();
+    /// let grown: Vec<_> = dome.iter().map(|p| p * 1.2).collect();
+    /// assert!(StrainField::mean_error(&dome, &grown, 0.0, 10).amax() < 1e-10);
+    /// assert!(StrainField::mean_error(&dome, &grown, 0.1, 10)[(2, 2)] > 0.005);
+    /// ```
+    pub fn mean_error(
+        sources: &[Point3<f64>],
+        targets: &[Point3<f64>],
+        grid_m: f64,
+        run_length: usize,
+    ) -> Matrix3<f64> {
+        let [from, to] = [sources, targets].map(Disc::of);
+        let offsets = || pairs_of(sources, targets, [&from, &to]);
+        let spread: Matrix3<f64> = offsets().map(|(d, _)| d * d.transpose()).sum();
+        // Directions that the points do not span are undetermined. A small multiple of the identity
+        // keeps the inverse finite.
+        let inverse = (spread + Matrix3::identity() * (1e-12 * spread.trace())).try_inverse();
+        let Some(inverse) = inverse else {
+            return Matrix3::zeros();
+        };
+        let slope = offsets()
+            .map(|(d, t)| t * d.transpose())
+            .sum::<Matrix3<f64>>()
+            * inverse;
+        let gradient = clustered(offsets(), run_length, &slope, &inverse);
+        let along = |k: usize| slope.column(k).norm();
+        let edge = EDGE_PX * grid_m * (from.radius.recip() - to.radius.recip()).abs();
+        let residual: Vector3<f64> = offsets()
+            .map(|(d, t)| t - slope * d)
+            .map(|r| r.component_mul(&r))
+            .sum();
+        // Both surfaces have the same errors, in the units of the first.
+        let dilution = |k: usize| residual[k] * inverse[(k, k)] / (1.0 + along(k).powi(2));
+        Matrix3::from_fn(|j, k| {
+            if j == k {
+                let square = along(j).powi(2);
+                (along(j) * gradient[(j, j)])
+                    .hypot(square * edge)
+                    .hypot(square * dilution(j))
+            } else {
+                0.5 * (along(j) * gradient[(j, k)]).hypot(along(k) * gradient[(k, j)])
+            }
+        })
+    }
 }
 
 /// The disc in the image plane with the centroid and spread of the points.

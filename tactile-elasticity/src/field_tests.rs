@@ -20,8 +20,8 @@ fn exact_pairs_have_no_error_but_the_edges() {
     let sources = dome();
     let targets: Vec<_> = sources.iter().map(|p| p * 1.2).collect();
     // The term that keeps the inverse finite is 1e-12 of the trace; the rest is rounding.
-    assert!(mean_strain_error(&sources, &targets, 0.0, RUN_LENGTH).amax() < 1e-10);
-    let edge = mean_strain_error(&sources, &targets, 0.1, RUN_LENGTH);
+    assert!(StrainField::mean_error(&sources, &targets, 0.0, RUN_LENGTH).amax() < 1e-10);
+    let edge = StrainField::mean_error(&sources, &targets, 0.1, RUN_LENGTH);
     let disc = (2.0 * sources.iter().map(|p| p.x * p.x + p.y * p.y).sum::<f64>() / 200.0).sqrt();
     let expected = 1.44 * EDGE_PX * 0.1 * (1.0 - 1.0 / 1.2) / disc;
     // The centroid of the disc is close to the origin, but not exactly there.
@@ -46,7 +46,7 @@ fn errors_that_neighbours_share_are_told() {
         let spread: Matrix3<f64> = offsets().map(|(d, _)| d * d.transpose()).sum();
         let outer: Matrix3<f64> = offsets().map(|(d, t)| t * d.transpose()).sum();
         let slope = (outer * spread.try_inverse().unwrap())[(2, 2)];
-        told += mean_strain_error(&sources, &targets, 0.0, RUN_LENGTH)[(2, 2)].powi(2);
+        told += StrainField::mean_error(&sources, &targets, 0.0, RUN_LENGTH)[(2, 2)].powi(2);
         true_square += (0.5 * (slope * slope - 1.44)).powi(2);
     }
     let ratio = (told / true_square).sqrt();
@@ -59,7 +59,7 @@ fn errors_that_neighbours_share_are_told() {
 fn points_that_span_no_volume_leave_a_finite_error() {
     let flat = dome().iter().map(|p| Point3::new(p.x, p.y, 0.0)).collect();
     for points in [flat, vec![Point3::origin(); 20]] {
-        let error = mean_strain_error(&points, &points, 1e-3, RUN_LENGTH);
+        let error = StrainField::mean_error(&points, &points, 1e-3, RUN_LENGTH);
         assert!(error.iter().all(|v| v.is_finite()));
     }
 }

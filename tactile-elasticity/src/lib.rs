@@ -42,4 +42,3 @@ pub mod strain;
 
 pub use error::{ElasticityError, Quantity};
 pub use nalgebra;
-pub use tactile_core::{CustomError, statistics};

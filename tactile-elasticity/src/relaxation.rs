@@ -35,7 +35,7 @@ use tactile_core::{Estimate, Interval, statistics::quantile_95};
 ///
 /// ```
 /// use tactile_elasticity::modulus::Estimate;
-/// use tactile_elasticity::relaxation::{TimeDependence, TimedModulus, time_dependence};
+/// use tactile_elasticity::relaxation::{TimeDependence, TimedModulus};
 ///
 /// let at = |time_s: f64| TimedModulus {
 ///     time_s,
@@ -43,7 +43,7 @@ use tactile_core::{Estimate, Interval, statistics::quantile_95};
 ///     youngs_modulus_pa: Estimate::new(100e3, 500.0),
 /// };
 /// assert_eq!(
-///     time_dependence(&[0.0, 1.0, 2.0, 4.0, 8.0].map(at), 0.01, 0.0)?,
+///     TimeDependence::of(&[0.0, 1.0, 2.0, 4.0, 8.0].map(at), 0.01, 0.0)?,
 ///     TimeDependence::Steady
 /// );
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -63,7 +63,7 @@ pub struct TimedModulus {
 ///
 /// ```
 /// use tactile_elasticity::modulus::Estimate;
-/// use tactile_elasticity::relaxation::{TimeDependence, TimedModulus, time_dependence};
+/// use tactile_elasticity::relaxation::{TimeDependence, TimedModulus};
 ///
 /// let series = |modulus: fn(f64) -> f64| {
 ///     [0.0, 1.0, 2.0, 3.0, 5.0, 8.0].map(|time_s| TimedModulus {
@@ -72,15 +72,15 @@ pub struct TimedModulus {
 ///         youngs_modulus_pa: Estimate::new(modulus(time_s), 300.0),
 ///     })
 /// };
-/// let relaxing = time_dependence(&series(|t| 80e3 + 30e3 * (-t / 2.0).exp()), 0.0, 0.0)?;
+/// let relaxing = TimeDependence::of(&series(|t| 80e3 + 30e3 * (-t / 2.0).exp()), 0.0, 0.0)?;
 /// assert!(matches!(relaxing, TimeDependence::Relaxes(_)));
 /// // No sample stiffens while it is held, but a gain may rise.
-/// let rising = time_dependence(&series(|t| 80e3 * (1.0 + 0.01 * t)), 0.0, 0.0)?;
+/// let rising = TimeDependence::of(&series(|t| 80e3 * (1.0 + 0.01 * t)), 0.0, 0.0)?;
 /// assert!(
 ///     matches!(rising, TimeDependence::Drifts { per_s } if (per_s.value - 0.01).abs() < 0.001)
 /// );
 /// // A sample that relaxes over hours looks like a gain that falls steadily.
-/// let falling = time_dependence(&series(|t| 80e3 * (1.0 - 0.01 * t)), 0.0, 0.0)?;
+/// let falling = TimeDependence::of(&series(|t| 80e3 * (1.0 - 0.01 * t)), 0.0, 0.0)?;
 /// assert!(
 ///     matches!(falling, TimeDependence::Undecided { change } if (change + 0.08).abs() < 0.01)
 /// );
@@ -117,7 +117,7 @@ pub enum TimeDependence {
 ///
 /// ```
 /// use tactile_elasticity::modulus::Estimate;
-/// use tactile_elasticity::relaxation::{TimeDependence, TimedModulus, time_dependence};
+/// use tactile_elasticity::relaxation::{TimeDependence, TimedModulus};
 ///
 /// // A weight of 0.7 N on 110 kPa that relax to 80 kPa with 2 s: the compliance creeps with 2 s ·
 /// // 110/80.
@@ -129,7 +129,7 @@ pub enum TimeDependence {
 ///         youngs_modulus_pa: Estimate::new(1.0 / compliance, 300.0),
 ///     }
 /// });
-/// let TimeDependence::Relaxes(solid) = time_dependence(&loads, 0.0, 0.0)? else {
+/// let TimeDependence::Relaxes(solid) = TimeDependence::of(&loads, 0.0, 0.0)? else {
 ///     unreachable!()
 /// };
 /// assert!(
@@ -146,6 +146,7 @@ pub enum TimeDependence {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct StandardLinearSolid {
     /// E₀, the modulus of a load too fast to relax.
     pub instantaneous_pa: f64,
@@ -177,98 +178,100 @@ const TREND: f64 = 6.63;
 // table in § 3.2).
 const STRONG_EVIDENCE: f64 = 6.0;
 
-/// Distinguishes a relaxing sample from a drifting sensor, from the moduli of single loads in the
-/// order of time.
-///
-/// `scale_error` is the relative standard error common to all moduli, which widens the intervals of
-/// E₀ and E∞. `law_error` is the relative error of the law behind the moduli, for loads that differ
-/// by a factor of e. It prevents an increasing load from being mistaken for an effect of time.
-///
-/// Five loads at different times are needed. With fewer, only a significant trend is reported, as
-/// [`TimeDependence::Undecided`]. A solid is reported if the likelihood ratio against a constant
-/// exceeds 8 (1 % of constant series do), the Bayesian criterion prefers it to a drift by more than
-/// 6, and its time constant does not exceed the duration of the series. If the moduli scatter about
-/// the best solid by more than their errors, the errors are scaled up. O(n) for each of about 400
-/// time constants.
-///
-/// # Errors
-/// [`ElasticityError::TooFewLoads`] without loads, [`ElasticityError::NotPositive`] for forces,
-/// moduli and their errors, [`ElasticityError::Negative`] for times and for the two errors,
-/// [`ElasticityError::TimeDecreases`].
-///
-/// ```
-/// use tactile_elasticity::ElasticityError;
-/// use tactile_elasticity::modulus::Estimate;
-/// use tactile_elasticity::relaxation::{TimeDependence, TimedModulus, time_dependence};
-///
-/// let at = |time_s: f64, kpa: f64| TimedModulus {
-///     time_s,
-///     force_n: 0.7,
-///     youngs_modulus_pa: Estimate::new(1e3 * kpa, 200.0),
-/// };
-/// // Three loads reveal a change, but not its cause.
-/// let few = time_dependence(&[at(0.0, 100.0), at(1.0, 97.0), at(2.0, 95.0)], 0.0, 0.0)?;
-/// assert!(matches!(few, TimeDependence::Undecided { change } if (change + 0.05).abs() < 0.01));
-/// let back = time_dependence(&[at(1.0, 100.0), at(0.0, 97.0)], 0.0, 0.0).unwrap_err();
-/// assert_eq!(
-///     back,
-///     ElasticityError::TimeDecreases {
-///         load: 1,
-///         before_s: 1.0,
-///         found_s: 0.0
-///     }
-/// );
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-pub fn time_dependence(
-    moduli: &[TimedModulus],
-    scale_error: f64,
-    law_error: f64,
-) -> Result<TimeDependence, ElasticityError> {
-    let scale_error = Quantity::StandardError.not_negative(scale_error)?;
-    let law_error = Quantity::StandardError.not_negative(law_error)?;
-    let times = checked_times(moduli)?;
-    if times < 2 {
-        return Ok(TimeDependence::Steady);
+impl TimeDependence {
+    /// Distinguishes a relaxing sample from a drifting sensor, from the moduli of single loads in the
+    /// order of time.
+    ///
+    /// `scale_error` is the relative standard error common to all moduli, which widens the intervals of
+    /// E₀ and E∞. `law_error` is the relative error of the law behind the moduli, for loads that differ
+    /// by a factor of e. It prevents an increasing load from being mistaken for an effect of time.
+    ///
+    /// Five loads at different times are needed. With fewer, only a significant trend is reported, as
+    /// [`Undecided`](Self::Undecided). A solid is reported if the likelihood ratio against a constant
+    /// exceeds 8 (1 % of constant series do), the Bayesian criterion prefers it to a drift by more than
+    /// 6, and its time constant does not exceed the duration of the series. If the moduli scatter about
+    /// the best solid by more than their errors, the errors are scaled up. O(n) for each of about 400
+    /// time constants.
+    ///
+    /// # Errors
+    /// [`ElasticityError::TooFewLoads`] without loads, [`ElasticityError::NotPositive`] for forces,
+    /// moduli and their errors, [`ElasticityError::Negative`] for times and for the two errors,
+    /// [`ElasticityError::TimeDecreases`].
+    ///
+    /// ```
+    /// use tactile_elasticity::ElasticityError;
+    /// use tactile_elasticity::modulus::Estimate;
+    /// use tactile_elasticity::relaxation::{TimeDependence, TimedModulus};
+    ///
+    /// let at = |time_s: f64, kpa: f64| TimedModulus {
+    ///     time_s,
+    ///     force_n: 0.7,
+    ///     youngs_modulus_pa: Estimate::new(1e3 * kpa, 200.0),
+    /// };
+    /// // Three loads reveal a change, but not its cause.
+    /// let few = TimeDependence::of(&[at(0.0, 100.0), at(1.0, 97.0), at(2.0, 95.0)], 0.0, 0.0)?;
+    /// assert!(matches!(few, TimeDependence::Undecided { change } if (change + 0.05).abs() < 0.01));
+    /// let back = TimeDependence::of(&[at(1.0, 100.0), at(0.0, 97.0)], 0.0, 0.0).unwrap_err();
+    /// assert_eq!(
+    ///     back,
+    ///     ElasticityError::TimeDecreases {
+    ///         load: 1,
+    ///         before_s: 1.0,
+    ///         found_s: 0.0
+    ///     }
+    /// );
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
+    pub fn of(
+        moduli: &[TimedModulus],
+        scale_error: f64,
+        law_error: f64,
+    ) -> Result<Self, ElasticityError> {
+        let scale_error = Quantity::StandardError.not_negative(scale_error)?;
+        let law_error = Quantity::StandardError.not_negative(law_error)?;
+        let times = checked_times(moduli)?;
+        if times < 2 {
+            return Ok(Self::Steady);
+        }
+        let series = Series::new(moduli, law_error);
+        let (constant, trend) = (series.constant(), series.trend());
+        if times < FEWEST_LOADS {
+            let changes = constant.chi_squared - trend.chi_squared > TREND;
+            return Ok(match changes {
+                true => undecided(&series, &trend),
+                false => Self::Steady,
+            });
+        }
+        let profile = Profile::new(&series);
+        let best = profile.best();
+        let count = moduli.len() as f64;
+        let least = best.map_or(f64::INFINITY, |(_, line)| line.chi_squared);
+        // Scatter beyond the errors about the better model, common to constants, trends and solids.
+        let excess = (least / (count - 3.0))
+            .min(trend.chi_squared / (count - 2.0))
+            .max(1.0);
+        let fall = (constant.chi_squared - least) / excess;
+        let steady_change = (constant.chi_squared - trend.chi_squared) / excess;
+        if fall.max(steady_change) <= CHANGE {
+            return Ok(Self::Steady);
+        }
+        let preference = (trend.chi_squared - least) / excess - count.ln();
+        if let Some((time_constant_s, _)) = best
+            && preference > STRONG_EVIDENCE
+            && time_constant_s <= series.times_s[series.times_s.len() - 1]
+            && let Some(solid) = profile.solid(excess, count, scale_error)
+        {
+            return Ok(Self::Relaxes(solid));
+        }
+        let slope = relative_slope(&series, &trend);
+        let error = excess.sqrt() * slope.standard_error;
+        if slope.value > 0.0 && steady_change > CHANGE {
+            return Ok(Self::Drifts {
+                per_s: Estimate::new(slope.value, error),
+            });
+        }
+        Ok(undecided(&series, &trend))
     }
-    let series = Series::new(moduli, law_error);
-    let (constant, trend) = (series.constant(), series.trend());
-    if times < FEWEST_LOADS {
-        let changes = constant.chi_squared - trend.chi_squared > TREND;
-        return Ok(match changes {
-            true => undecided(&series, &trend),
-            false => TimeDependence::Steady,
-        });
-    }
-    let profile = Profile::new(&series);
-    let best = profile.best();
-    let count = moduli.len() as f64;
-    let least = best.map_or(f64::INFINITY, |(_, line)| line.chi_squared);
-    // Scatter beyond the errors about the better model, common to constants, trends and solids.
-    let excess = (least / (count - 3.0))
-        .min(trend.chi_squared / (count - 2.0))
-        .max(1.0);
-    let fall = (constant.chi_squared - least) / excess;
-    let steady_change = (constant.chi_squared - trend.chi_squared) / excess;
-    if fall.max(steady_change) <= CHANGE {
-        return Ok(TimeDependence::Steady);
-    }
-    let preference = (trend.chi_squared - least) / excess - count.ln();
-    if let Some((time_constant_s, _)) = best
-        && preference > STRONG_EVIDENCE
-        && time_constant_s <= series.times_s[series.times_s.len() - 1]
-        && let Some(solid) = profile.solid(excess, count, scale_error)
-    {
-        return Ok(TimeDependence::Relaxes(solid));
-    }
-    let slope = relative_slope(&series, &trend);
-    let error = excess.sqrt() * slope.standard_error;
-    if slope.value > 0.0 && steady_change > CHANGE {
-        return Ok(TimeDependence::Drifts {
-            per_s: Estimate::new(slope.value, error),
-        });
-    }
-    Ok(undecided(&series, &trend))
 }
 
 /// The number of different times. Rejects invalid series.

@@ -372,6 +372,22 @@ impl Deformation {
         }
     }
 
+    /// The principal stretches, the singular values of F, with the largest first. Its entries must
+    /// be finite.
+    ///
+    /// ```
+    /// use nalgebra::{Matrix3, Vector3};
+    /// use tactile_elasticity::strain::Deformation;
+    ///
+    /// let h = Matrix3::from_diagonal(&Vector3::new(0.0, 0.02, -0.05));
+    /// let [first, _, third] = Deformation::from_displacement_gradient(h).stretches();
+    /// assert!((first - 1.02_f64).abs() < 1e-15 && (third - 0.95_f64).abs() < 1e-15);
+    /// ```
+    #[must_use]
+    pub fn stretches(&self) -> [f64; 3] {
+        PrincipalStretches::from(self).stretches
+    }
+
     /// J = det F. Negative if the material is inverted.
     pub fn jacobian(&self) -> f64 {
         match self.given {
@@ -566,22 +582,8 @@ impl DoubleDouble {
 }
 
 /// The right stretch U in its principal axes, with the largest stretch first.
-///
-/// ```
-/// use nalgebra::{Matrix3, Vector3};
-/// use tactile_elasticity::strain::{Deformation, PrincipalStretches};
-///
-/// let deformation = Deformation::from_displacement_gradient(Matrix3::from_diagonal(
-///     &Vector3::new(0.0, 1e-20, -0.05),
-/// ));
-/// let principal = PrincipalStretches::from(&deformation);
-/// assert!((principal.elongations[0] / 1e-20_f64 - 1.0).abs() < 1e-12);
-/// assert!((principal.stretches[2] - 0.95).abs() < 1e-15);
-/// assert!((principal.directions.column(2)[2].abs() - 1.0).abs() < 1e-15);
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct PrincipalStretches {
+pub(crate) struct PrincipalStretches {
     /// λᵢ, the singular values of F.
     pub stretches: [f64; 3],
     /// λᵢ − 1, without cancellation if the strain is small.
@@ -728,35 +730,4 @@ fn sorted(values: [f64; 3], v: Matrix3<f64>) -> ([f64; 3], Matrix3<f64>) {
     });
     let columns = order.map(|i| v.column(i).into_owned());
     (order.map(|i| values[i]), Matrix3::from_columns(&columns))
-}
-
-/// I₁ = tr A, I₂ = ½(tr² A − tr A²), I₃ = det A.
-///
-/// ```
-/// use nalgebra::{Matrix3, Vector3};
-/// use tactile_elasticity::strain::Invariants;
-/// let i = Invariants::from(&Matrix3::from_diagonal(&Vector3::new(1.0, 2.0, 3.0)));
-/// assert_eq!((i.first, i.second, i.third), (6.0, 11.0, 6.0));
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct Invariants {
-    /// I₁. For a small strain it is the relative change of volume.
-    pub first: f64,
-    /// I₂.
-    pub second: f64,
-    /// I₃.
-    pub third: f64,
-}
-
-impl From<&Matrix3<f64>> for Invariants {
-    /// Computes the invariants of a tensor.
-    fn from(a: &Matrix3<f64>) -> Self {
-        let minor = |i: usize, j: usize| a[(i, i)] * a[(j, j)] - a[(i, j)] * a[(j, i)];
-        Self {
-            first: a.trace(),
-            second: minor(0, 1) + minor(0, 2) + minor(1, 2),
-            third: a.determinant(),
-        }
-    }
 }

@@ -111,6 +111,7 @@ impl std::fmt::Display for Doubt {
     derive(serde::Serialize, serde::Deserialize),
     serde(rename_all = "snake_case")
 )]
+#[non_exhaustive]
 pub enum Judgement {
     /// The pairs were given by the caller, or are too few to compare the motions of neighbours.
     #[default]

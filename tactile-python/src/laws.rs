@@ -40,7 +40,7 @@ pub(crate) fn hertz(
     let other = other_modulus.map(|modulus| Body::elastic(modulus, other_poisson_ratio));
     let other = other.transpose().map_err(invalid)?;
     let found = Body::elastic(youngs_modulus, poisson_ratio)
-        .and_then(|ball| contact::reduced_modulus_pa(ball, other.unwrap_or(Body::rigid())))
+        .and_then(|ball| ball.reduced_modulus_pa(other.unwrap_or(Body::rigid())))
         .and_then(|reduced| contact::HertzContact::from_force(force, radius, reduced))
         .map_err(invalid)?;
     Ok(HertzContact {

@@ -25,6 +25,7 @@ const RIM_DISTANCE_PX: f64 = 0.25;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum Binning {
     /// Blocks as large as the control points allow: at least 16 blocks inside the contact per
     /// point.

@@ -25,6 +25,7 @@ use tactile_core::Requirement;
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Lighting<T> {
     direction: [T; 3],
     ambient: T,

@@ -92,6 +92,7 @@ impl BitOrAssign for PixelFlags {
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Component<T> {
     /// Number of pixels.
     pub pixels: usize,

@@ -12,9 +12,7 @@
 //! Control Syst. 3, 293).
 use super::{KnownBall, is_known, is_positive};
 use crate::core::{Estimate, Source};
-use crate::elasticity::contact::{
-    Bond, Layer, PARABOLA_ERROR, Waveguide, guide_log_stiffness, parameter_slopes, stepped_layers,
-};
+use crate::elasticity::contact::{Bond, Layer, Waveguide};
 use crate::elasticity::laws::{ContactLaw, ContactLength, WaveguideLaw};
 use crate::elasticity::modulus::Bodies;
 use crate::pipeline::assumptions::CheckedGuide;
@@ -83,7 +81,7 @@ impl GuideCheck {
         let a = self.radius_m.value;
         match self.ball.youngs_modulus_pa {
             Some(_) => Some(self.log_force(layers)?.law_error),
-            None => Some(PARABOLA_ERROR * (a / self.ball.radius_m.value).powi(2)),
+            None => Some(Layer::PARABOLA_ERROR * (a / self.ball.radius_m.value).powi(2)),
         }
     }
 
@@ -127,7 +125,7 @@ impl KnownBall {
     /// ln F of a contact of radius a (m), with its derivatives in ln a and ln R.
     fn log_force(&self, layers: &[Layer], a: f64) -> Option<PressForce> {
         let Some(modulus) = self.youngs_modulus_pa else {
-            let stiffness = |a: f64| guide_log_stiffness(layers, a);
+            let stiffness = |a: f64| Layer::log_stiffness(layers, a);
             let here = stiffness(a)?;
             let slope = (stiffness(a * STEP.exp())? - here) / STEP;
             let hertz = (4.0 / 3.0_f64).ln() + 3.0 * a.ln() - self.radius_m.value.ln();
@@ -241,13 +239,13 @@ pub(super) fn update(
     let by_length = forces.iter().map(|force| force.slope);
     let by_length = DVector::from_iterator(checks.len(), by_length);
     let predicted = |x: &DVector<f64>| -> Option<Vec<f64>> {
-        let forces = log_forces(checks, &stepped_layers(stated, x))?;
+        let forces = log_forces(checks, &Layer::stepped(stated, x))?;
         Some(forces.iter().map(|force| force.value).collect())
     };
     for round in 0..MOST_ROUNDS {
         let here = predicted(&x).ok_or(unsolved)?;
         let moves = |k: usize| prior[(k, k)] > 0.0;
-        let slopes = parameter_slopes(&here, &x, moves, predicted).ok_or(unsolved)?;
+        let slopes = Layer::slopes(&here, &x, moves, predicted).ok_or(unsolved)?;
         let gap = &log_known - DVector::from_vec(here);
         let whole = &slopes * &prior * slopes.transpose() + &noise;
         if round == 0 {
@@ -277,10 +275,10 @@ pub(super) fn update(
             break;
         }
     }
-    let layers = stepped_layers(stated, &x);
+    let layers = Layer::stepped(stated, &x);
     let sum: f64 = checks.iter().map(|check| check.radius_m.value).sum();
     let mean_m = sum / checks.len() as f64;
-    let stiffness = |layers: &[Layer]| guide_log_stiffness(layers, mean_m).ok_or(unsolved);
+    let stiffness = |layers: &[Layer]| Layer::log_stiffness(layers, mean_m).ok_or(unsolved);
     let ratio = (stiffness(&layers)? - stiffness(stated)?).exp();
     let layers = Waveguide::new(layers).map_err(|_| unsolved)?;
     let bodies = Bodies::new(settings.object, Some(layers.clone()))

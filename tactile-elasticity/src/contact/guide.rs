@@ -8,98 +8,100 @@ use nalgebra::{DMatrix, DVector};
 use std::sync::OnceLock;
 use tactile_core::{Source, Uncertain};
 
-/// Number of parameters of a layer with errors: ln E, ln h and ν.
-pub const PARAMETERS_PER_LAYER: usize = 3;
-
 // Step of the numerical derivatives. The error is of third order in it, and rounding of the
 // integral equation is far below.
 const STEP: f64 = 1e-3;
 
-/// ln of the stiffness E_g of the guide under a ball's contact of radius a, F = 4/3 E_g a³/R.
-/// `None` if the layer equation cannot be solved.
-///
-/// ```
-/// use tactile_elasticity::contact::{Layer, guide_log_stiffness};
-/// let gel = Layer { thickness_m: 10e-3, youngs_modulus_pa: 75e3, poisson_ratio: 0.5 };
-/// // For a small contact the guide is a half-space, E/(1 − ν²).
-/// let stiffness_pa = guide_log_stiffness(&[gel], 1e-5).unwrap().exp();
-/// assert!((stiffness_pa / 100e3 - 1.0).abs() < 0.01);
-/// ```
-pub fn guide_log_stiffness(layers: &[Layer], radius_m: f64) -> Option<f64> {
-    let guide = Waveguide::new(layers.to_vec()).ok()?;
-    let equation = LayerEquation::of_layers(&guide, Bond::Bonded).ok()?;
-    let contact = equation.solve(radius_m / guide.thickness_m()).ok()?;
-    let plane_strain = guide.touched().compliance_per_pa().recip();
-    Some(plane_strain.ln() + contact.force_ratio_same_radius.ln())
-}
+impl Layer {
+    /// Number of parameters of a layer with errors: ln E, ln h and ν.
+    pub const PARAMETERS: usize = 3;
 
-/// Layers with their parameters changed by a step: ln E of all layers, then ln h, then ν, which is
-/// limited to ½.
-///
-/// ```
-/// use nalgebra::DVector;
-/// use tactile_elasticity::contact::{Layer, stepped_layers};
-/// let gel = Layer { thickness_m: 10e-3, youngs_modulus_pa: 75e3, poisson_ratio: 0.5 };
-/// let stiffer = stepped_layers(&[gel], &DVector::from_vec(vec![2_f64.ln(), 0.0, 0.1]));
-/// assert!((stiffer[0].youngs_modulus_pa - 150e3).abs() < 1e-6 && stiffer[0].poisson_ratio == 0.5);
-/// ```
-pub fn stepped_layers(layers: &[Layer], step: &DVector<f64>) -> Vec<Layer> {
-    let n = layers.len();
-    let layer = |(i, layer): (usize, &Layer)| Layer {
-        youngs_modulus_pa: layer.youngs_modulus_pa * step[i].exp(),
-        thickness_m: layer.thickness_m * step[n + i].exp(),
-        poisson_ratio: (layer.poisson_ratio + step[2 * n + i]).min(0.5),
-    };
-    layers.iter().enumerate().map(layer).collect()
-}
+    /// Relative error of F = 4/3 E_g a³/R at a/R = 1, because a rigid ball is approximated by a
+    /// parabola and strains are assumed small. It is proportional to (a/R)².
+    pub const PARABOLA_ERROR: f64 = 0.1;
 
-/// Relative error of F = 4/3 E_g a³/R at a/R = 1, because a rigid ball is approximated by a
-/// parabola and strains are assumed small. It is proportional to (a/R)².
-pub const PARABOLA_ERROR: f64 = 0.1;
-
-/// Derivatives of values by parameters x, such as of forces by the parameters of
-/// [`stepped_layers`], as a matrix \[value, parameter\]. `here` holds the values at x. Steps are
-/// negative, because ν is at most ½. Parameters without a step have zeros. `None` if the values are
-/// `None`.
-///
-/// ```
-/// use nalgebra::DVector;
-/// use tactile_elasticity::contact::parameter_slopes;
-/// let values = |x: &DVector<f64>| Some(vec![x[0].exp(), x[0] * x[1]]);
-/// let x = DVector::from_vec(vec![0.0, 2.0]);
-/// let slopes = parameter_slopes(&[1.0, 0.0], &x, |k| k == 0, values).unwrap();
-/// assert!((slopes[(0, 0)] - 1.0).abs() < 1e-3 && (slopes[(1, 0)] - 2.0).abs() < 1e-3);
-/// assert_eq!(slopes[(1, 1)], 0.0);
-/// ```
-pub fn parameter_slopes(
-    here: &[f64],
-    x: &DVector<f64>,
-    moves: impl Fn(usize) -> bool,
-    values: impl Fn(&DVector<f64>) -> Option<Vec<f64>>,
-) -> Option<DMatrix<f64>> {
-    let mut slopes = DMatrix::zeros(here.len(), x.len());
-    for k in (0..x.len()).filter(|&k| moves(k)) {
-        let mut beside = x.clone();
-        beside[k] -= STEP;
-        for (i, (there, here)) in values(&beside)?.iter().zip(here).enumerate() {
-            slopes[(i, k)] = (there - here) / -STEP;
-        }
+    /// ln of the stiffness E_g of the guide under a ball's contact of radius a, F = 4/3 E_g a³/R.
+    /// `None` if the layer equation cannot be solved.
+    ///
+    /// ```
+    /// use tactile_elasticity::contact::Layer;
+    /// let gel = Layer { thickness_m: 10e-3, youngs_modulus_pa: 75e3, poisson_ratio: 0.5 };
+    /// // For a small contact the guide is a half-space, E/(1 − ν²).
+    /// let stiffness_pa = Layer::log_stiffness(&[gel], 1e-5).unwrap().exp();
+    /// assert!((stiffness_pa / 100e3 - 1.0).abs() < 0.01);
+    /// ```
+    pub fn log_stiffness(layers: &[Self], radius_m: f64) -> Option<f64> {
+        let guide = Waveguide::new(layers.to_vec()).ok()?;
+        let equation = LayerEquation::of_layers(&guide, Bond::Bonded).ok()?;
+        let contact = equation.solve(radius_m / guide.thickness_m()).ok()?;
+        let plane_strain = guide.touched().compliance_per_pa().recip();
+        Some(plane_strain.ln() + contact.force_ratio_same_radius.ln())
     }
-    Some(slopes)
+
+    /// Layers with their parameters changed by a step: ln E of all layers, then ln h, then ν, which is
+    /// limited to ½.
+    ///
+    /// ```
+    /// use nalgebra::DVector;
+    /// use tactile_elasticity::contact::Layer;
+    /// let gel = Layer { thickness_m: 10e-3, youngs_modulus_pa: 75e3, poisson_ratio: 0.5 };
+    /// let stiffer = Layer::stepped(&[gel], &DVector::from_vec(vec![2_f64.ln(), 0.0, 0.1]));
+    /// assert!((stiffer[0].youngs_modulus_pa - 150e3).abs() < 1e-6 && stiffer[0].poisson_ratio == 0.5);
+    /// ```
+    pub fn stepped(layers: &[Self], step: &DVector<f64>) -> Vec<Self> {
+        let n = layers.len();
+        let layer = |(i, layer): (usize, &Self)| Self {
+            youngs_modulus_pa: layer.youngs_modulus_pa * step[i].exp(),
+            thickness_m: layer.thickness_m * step[n + i].exp(),
+            poisson_ratio: (layer.poisson_ratio + step[2 * n + i]).min(0.5),
+        };
+        layers.iter().enumerate().map(layer).collect()
+    }
+
+    /// Derivatives of values by parameters x, such as of forces by those of
+    /// [`stepped`](Self::stepped), as a matrix \[value, parameter\]. `here` holds the values at x. Steps are
+    /// negative, because ν is at most ½. Parameters without a step have zeros. `None` if the values are
+    /// `None`.
+    ///
+    /// ```
+    /// use nalgebra::DVector;
+    /// use tactile_elasticity::contact::Layer;
+    /// let values = |x: &DVector<f64>| Some(vec![x[0].exp(), x[0] * x[1]]);
+    /// let x = DVector::from_vec(vec![0.0, 2.0]);
+    /// let slopes = Layer::slopes(&[1.0, 0.0], &x, |k| k == 0, values).unwrap();
+    /// assert!((slopes[(0, 0)] - 1.0).abs() < 1e-3 && (slopes[(1, 0)] - 2.0).abs() < 1e-3);
+    /// assert_eq!(slopes[(1, 1)], 0.0);
+    /// ```
+    pub fn slopes(
+        here: &[f64],
+        x: &DVector<f64>,
+        moves: impl Fn(usize) -> bool,
+        values: impl Fn(&DVector<f64>) -> Option<Vec<f64>>,
+    ) -> Option<DMatrix<f64>> {
+        let mut slopes = DMatrix::zeros(here.len(), x.len());
+        for k in (0..x.len()).filter(|&k| moves(k)) {
+            let mut beside = x.clone();
+            beside[k] -= STEP;
+            for (i, (there, here)) in values(&beside)?.iter().zip(here).enumerate() {
+                slopes[(i, k)] = (there - here) / -STEP;
+            }
+        }
+        Some(slopes)
+    }
 }
 
-/// Derivatives of [`guide_log_stiffness`] by ln E, ln h and ν of the layers, in this order. `None`
+/// Derivatives of [`Layer::log_stiffness`] by ln E, ln h and ν of the layers, in this order. `None`
 /// if the layer equation cannot be solved.
 fn log_stiffness_gradient(guide: &Waveguide, radius_m: f64) -> Option<DVector<f64>> {
     let layers = guide.layers();
-    let count = PARAMETERS_PER_LAYER * layers.len();
+    let count = Layer::PARAMETERS * layers.len();
     // ν is at most ½, so only negative steps are used.
     let upper = |k: usize| if k < 2 * layers.len() { STEP } else { 0.0 };
     let moved = (0..count).map(|k| {
         let at = |value: f64| {
             let mut step = DVector::zeros(count);
             step[k] = value;
-            stepped_layers(layers, &step)
+            Layer::stepped(layers, &step)
         };
         ([at(-STEP), at(upper(k))], upper(k) + STEP)
     });

@@ -19,7 +19,7 @@ fn the_gradient_obeys_the_scaling_laws() {
     assert!((moduli - 1.0).abs() < 1e-6, "{moduli}");
     // Scaling the layers and the contact together changes nothing, so the slopes by ln h cancel
     // that by ln a.
-    let [low, high] = [1.5e-3 / 1.001, 1.5e-3 * 1.001].map(|a| guide_log_stiffness(&layers, a));
+    let [low, high] = [1.5e-3 / 1.001, 1.5e-3 * 1.001].map(|a| Layer::log_stiffness(&layers, a));
     let by_radius = (high.unwrap() - low.unwrap()) / (2.0 * 1.001_f64.ln());
     let by_thickness: f64 = slopes.rows(3, 3).sum();
     assert!((by_radius + by_thickness).abs() < 1e-5);
@@ -41,7 +41,7 @@ fn the_gradient_is_the_limit_of_differences() {
             let at = |value: f64| {
                 let mut step = DVector::zeros(slopes.len());
                 step[k] = value;
-                guide_log_stiffness(&stepped_layers(&layers, &step), a).unwrap()
+                Layer::log_stiffness(&Layer::stepped(&layers, &step), a).unwrap()
             };
             let difference = (at(1e-3) - at(-1e-3)) / 2e-3;
             // Differences have an error of about 1e-6. For ν the gradient uses negative steps: half

@@ -18,6 +18,7 @@ use std::f64::consts::PI;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct HertzContact {
     /// F.
     pub force_n: f64,
@@ -65,52 +66,52 @@ impl HertzContact {
             stiffness_n_per_m: reduced_modulus_pa * a * 2.0,
         })
     }
-}
 
-/// Normal displacement (m) at distance r of a half-space under p₀√(1 − r²/a²) (Johnson 1985, eq.
-/// 3.42).
-///
-/// Inside the contact it is π p₀(2a² − r²)/(4aE*). Outside it is p₀/(2aE*)·[(2a² − r²) asin(a/r) +
-/// a√(r² − a²)]. Its terms cancel to (a/r)², so from r = 2a on it is summed as ½ p₀ a/E* Σ 4 b_k
-/// (a/r)^(2k+1)/((2k+1)(2k+3)) with b_k = (2k)!/(4ᵏ k!²), whose terms are all positive.
-///
-/// ```
-/// use tactile_elasticity::contact::hertz_surface_displacement_m;
-/// // Far away the contact acts as a point force: F/(π E* r), with F = ⅔ π a² p₀.
-/// let far = hertz_surface_displacement_m(1e8, 1.0, 1.0, 1.0);
-/// assert!((far * 1e8 - 2.0f64 / 3.0).abs() < 1e-15);
-/// // Under a rigid sphere the rim sinks half as deep as the centre.
-/// let c = tactile_elasticity::contact::HertzContact::from_force(1e-3_f64, 5e-3, 50e3)?;
-/// let depth = |r| {
-///     hertz_surface_displacement_m(r, c.contact_radius_m, c.peak_pressure_pa, 50e3)
-///         / c.indentation_m
-/// };
-/// assert!((depth(0.0) - 1.0).abs() < 1e-14 && (depth(c.contact_radius_m) - 0.5).abs() < 1e-14);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-pub fn hertz_surface_displacement_m(
-    r: f64,
-    a: f64,
-    peak_pressure_pa: f64,
-    reduced_modulus_pa: f64,
-) -> f64 {
-    let r = r.abs();
-    if a <= 0.0 {
-        return 0.0;
+    /// Normal displacement (m) at distance r of a half-space under p₀√(1 − r²/a²) (Johnson 1985, eq.
+    /// 3.42).
+    ///
+    /// Inside the contact it is π p₀(2a² − r²)/(4aE*). Outside it is p₀/(2aE*)·[(2a² − r²) asin(a/r) +
+    /// a√(r² − a²)]. Its terms cancel to (a/r)², so from r = 2a on it is summed as ½ p₀ a/E* Σ 4 b_k
+    /// (a/r)^(2k+1)/((2k+1)(2k+3)) with b_k = (2k)!/(4ᵏ k!²), whose terms are all positive.
+    ///
+    /// ```
+    /// use tactile_elasticity::contact::HertzContact;
+    /// // Far away the contact acts as a point force: F/(π E* r), with F = ⅔ π a² p₀.
+    /// let far = HertzContact::surface_displacement_m(1e8, 1.0, 1.0, 1.0);
+    /// assert!((far * 1e8 - 2.0f64 / 3.0).abs() < 1e-15);
+    /// // Under a rigid sphere the rim sinks half as deep as the centre.
+    /// let c = HertzContact::from_force(1e-3_f64, 5e-3, 50e3)?;
+    /// let depth = |r| {
+    ///     HertzContact::surface_displacement_m(r, c.contact_radius_m, c.peak_pressure_pa, 50e3)
+    ///         / c.indentation_m
+    /// };
+    /// assert!((depth(0.0) - 1.0).abs() < 1e-14 && (depth(c.contact_radius_m) - 0.5).abs() < 1e-14);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
+    pub fn surface_displacement_m(
+        r: f64,
+        a: f64,
+        peak_pressure_pa: f64,
+        reduced_modulus_pa: f64,
+    ) -> f64 {
+        let r = r.abs();
+        if a <= 0.0 {
+            return 0.0;
+        }
+        let unit = peak_pressure_pa * a / reduced_modulus_pa;
+        if r <= a {
+            let x = r / a;
+            return unit * std::f64::consts::FRAC_PI_4 * (2.0 - x * x);
+        }
+        let x = a / r;
+        if x > 0.5 {
+            let y = r / a;
+            let chord = ((r - a) / a * ((r + a) / a)).sqrt();
+            // asin(a/r) from its tangent: near the rim a/r loses digits that r − a keeps.
+            return unit * 0.5 * ((2.0 - y * y) * 1f64.atan2(chord) + chord);
+        }
+        unit * 0.5 * far_series(x)
     }
-    let unit = peak_pressure_pa * a / reduced_modulus_pa;
-    if r <= a {
-        let x = r / a;
-        return unit * std::f64::consts::FRAC_PI_4 * (2.0 - x * x);
-    }
-    let x = a / r;
-    if x > 0.5 {
-        let y = r / a;
-        let chord = ((r - a) / a * ((r + a) / a)).sqrt();
-        // asin(a/r) from its tangent: near the rim a/r loses digits that r − a keeps.
-        return unit * 0.5 * ((2.0 - y * y) * 1f64.atan2(chord) + chord);
-    }
-    unit * 0.5 * far_series(x)
 }
 
 fn far_series(x: f64) -> f64 {
@@ -173,21 +174,21 @@ impl Body {
     pub fn compliance_per_pa(&self) -> f64 {
         self.compliance_per_pa
     }
-}
 
-/// E* of two bodies, 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂, in Pa.
-///
-/// # Errors
-/// [`ElasticityError::NotPositive`] if both are rigid.
-///
-/// ```
-/// use tactile_elasticity::contact::{Body, reduced_modulus_pa};
-/// let gel = Body::elastic(20_000.0, 0.5)?;
-/// assert!((reduced_modulus_pa(Body::rigid(), gel)? - 20_000.0f64 / 0.75).abs() < 1e-9);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-pub fn reduced_modulus_pa(one: Body, other: Body) -> Result<f64, ElasticityError> {
-    let compliance = one.compliance_per_pa + other.compliance_per_pa;
-    Quantity::ReducedModulus.positive(compliance)?;
-    Ok(1.0 / compliance)
+    /// E* with another body, 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂, in Pa.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotPositive`] if both are rigid.
+    ///
+    /// ```
+    /// use tactile_elasticity::contact::Body;
+    /// let gel = Body::elastic(20_000.0, 0.5)?;
+    /// assert!((Body::rigid().reduced_modulus_pa(gel)? - 20_000.0f64 / 0.75).abs() < 1e-9);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
+    pub fn reduced_modulus_pa(self, other: Self) -> Result<f64, ElasticityError> {
+        let compliance = self.compliance_per_pa + other.compliance_per_pa;
+        Quantity::ReducedModulus.positive(compliance)?;
+        Ok(1.0 / compliance)
+    }
 }

@@ -32,6 +32,7 @@ use std::f64::consts::FRAC_2_PI;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct LayerContact {
     /// a/h, with h the thickness of all layers.
     pub a_over_h: f64,
@@ -334,6 +335,7 @@ fn out_of_range(found: f64) -> ElasticityError {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum Bond {
     /// No displacement at the base.
     #[default]

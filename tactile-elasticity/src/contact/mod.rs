@@ -3,10 +3,9 @@
 //! | item | contact |
 //! |---|---|
 //! | [`HertzContact`] | two spheres, small contact |
-//! | [`depression_m`] | surface of layers under a ball's contact |
 //! | [`LayerEquation`] | sphere on one or more bonded layers: the solution by an integral equation |
 //! | [`ContactTable`] | soft ball on a guide, tabulated by finite elements |
-//! | [`Waveguide`] | the layers of a sensor |
+//! | [`Waveguide`] | the layers of a sensor, and their surface under a ball |
 
 mod depression;
 mod guide;
@@ -15,11 +14,7 @@ mod layers;
 mod table;
 mod waveguide;
 
-pub use depression::depression_m;
-pub use guide::{
-    PARABOLA_ERROR, PARAMETERS_PER_LAYER, guide_log_stiffness, parameter_slopes, stepped_layers,
-};
-pub use hertz::{Body, HertzContact, hertz_surface_displacement_m, reduced_modulus_pa};
+pub use hertz::{Body, HertzContact};
 pub use layers::{Bond, LayerContact, LayerEquation};
 pub use table::{ContactCurve, ContactTable};
 pub use waveguide::{Layer, Waveguide};

@@ -34,6 +34,7 @@ use std::ops::Deref;
 /// assert_eq!(ContactLength::Radius(1e-3).metres(), ContactLength::Indentation(1e-3).metres());
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum ContactLength {
     /// The contact radius a.
     Radius(f64),
@@ -155,6 +156,7 @@ impl LogForce {
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Reach {
     /// ln f at this length.
     At(LogForce),
@@ -190,6 +192,7 @@ impl From<Option<LogForce>> for Reach {
 /// assert_eq!((limits.radius_m, limits.contact_ratio), (Some(5e-3), 0.3));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Limits {
     /// R for laws with a radius. The diagnostics of every load then contain a/R.
     pub radius_m: Option<f64>,
@@ -219,6 +222,19 @@ impl Limits {
             contact_ratio,
             layers: None,
         }
+    }
+
+    /// Limits of a law of layers with thickness h (m), up to this a/h.
+    ///
+    /// ```
+    /// use tactile_elasticity::laws::Limits;
+    /// let limits = Limits::of_ball(5e-3, 0.3).with_layers(10e-3, 1.6);
+    /// assert_eq!(limits.layers, Some([10e-3, 1.6]));
+    /// ```
+    #[must_use]
+    pub fn with_layers(mut self, thickness_m: f64, contact_ratio: f64) -> Self {
+        self.layers = Some([thickness_m, contact_ratio]);
+        self
     }
 
     /// a/R. If only the indentation is known, it follows from Hertz's a² = Rδ.

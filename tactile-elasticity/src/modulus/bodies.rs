@@ -1,6 +1,6 @@
 //! The sample, and the guide that it is pressed against.
 
-use crate::contact::{Body, GuideErrors, PARAMETERS_PER_LAYER, Waveguide};
+use crate::contact::{Body, GuideErrors, Layer, Waveguide};
 use crate::error::{ElasticityError, Quantity, poisson};
 use nalgebra::{DMatrix, DVector};
 use tactile_core::{Source, Uncertain};
@@ -24,6 +24,7 @@ use tactile_core::{Source, Uncertain};
     derive(serde::Serialize),
     serde(tag = "shape", rename_all = "snake_case")
 )]
+#[non_exhaustive]
 pub enum Object {
     /// A ball.
     Sphere {
@@ -266,7 +267,7 @@ impl Bodies {
     }
 
     /// States the covariance of ln E of all layers, then of ln h, then of ν
-    /// ([`PARAMETERS_PER_LAYER`]), and the change of each per standard deviation of the pixel size,
+    /// ([`Layer::PARAMETERS`]), and the change of each per standard deviation of the pixel size,
     /// if they are correlated.
     ///
     /// # Errors
@@ -293,7 +294,7 @@ impl Bodies {
         by_pixel_size: Option<DVector<f64>>,
     ) -> Result<Self, ElasticityError> {
         let layers = self.guide.as_ref().map_or(0, |guide| guide.layers().len());
-        let expected = PARAMETERS_PER_LAYER * layers;
+        let expected = Layer::PARAMETERS * layers;
         let sizes = by_pixel_size.as_ref().map_or(expected, |v| v.len());
         for found in [covariance.nrows(), covariance.ncols(), sizes] {
             Quantity::StandardError.entries(found, expected)?;

@@ -49,6 +49,7 @@ pub(crate) fn validated(
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct LoadState {
     /// Force F.
     pub force_n: Uncertain,

@@ -21,6 +21,6 @@ pub use load::{LoadSeries, LoadState};
 pub use ratio::{PaperRatio, StrainReference};
 pub use regression::StressStrainRegression;
 pub use tabulated::TabulatedContact;
-pub use tactile_core::{Estimate, Interval, Source, Uncertain};
-pub use uniaxial::{UniaxialLoads, neo_hookean_excess};
+pub use tactile_core::{Estimate, Source, Uncertain};
+pub use uniaxial::UniaxialLoads;
 pub use warning::Warning;

@@ -32,6 +32,7 @@ pub(crate) const LINEAR_STRAIN: f64 = 0.1;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum StrainReference {
     /// The unloaded object: stress is counted from zero.
     #[default]

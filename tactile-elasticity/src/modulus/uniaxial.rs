@@ -120,6 +120,35 @@ impl UniaxialLoads {
             unloaded_area_m2: unloaded,
         })
     }
+
+    /// Relative excess of the ratio of conjugate stress to strain over the modulus, for a uniaxially
+    /// stretched rubber at a strain of this measure.
+    ///
+    /// An incompressible neo-Hookean solid has the nominal stress P = E (λ − λ⁻²)/3. Its [conjugate
+    /// stress](StrainMeasure::conjugate_stress) over the strain equals E only at small strain: at −9 %
+    /// it is 1.28 E for Green–Lagrange and 0.96 E for Hencky.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NoConjugateStress`], and [`ElasticityError::SingularDeformation`] for a
+    /// strain without a stretch between 0.05 and 4.
+    ///
+    /// ```
+    /// use tactile_elasticity::modulus::UniaxialLoads;
+    /// use tactile_elasticity::strain::{GreenLagrange, Hencky};
+    ///
+    /// // λ² = 0.82: (λ − λ⁻²)/(3 λ) = −0.1156.
+    /// assert!((UniaxialLoads::neo_hookean_excess(&GreenLagrange, -0.09)? - 0.284_f64).abs() < 1e-3);
+    /// assert!((UniaxialLoads::neo_hookean_excess(&Hencky, -0.09)? + 0.04).abs() < 0.01);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
+    pub fn neo_hookean_excess(
+        measure: &dyn StrainMeasure,
+        strain: f64,
+    ) -> Result<f64, ElasticityError> {
+        let stretch = stretch_of(measure, strain)?;
+        let nominal = (stretch - stretch.powi(-2)) / 3.0;
+        Ok(measure.conjugate_stress(nominal, stretch)? / strain - 1.0)
+    }
 }
 
 /// f(λ_t) = −ν f(λ_z).
@@ -213,33 +242,4 @@ fn stretch_of(measure: &dyn StrainMeasure, wanted: f64) -> Result<f64, Elasticit
         }
     }
     Ok(0.5 * (low + high))
-}
-
-/// Relative excess of the ratio of conjugate stress to strain over the modulus, for a uniaxially
-/// stretched rubber at a strain of this measure.
-///
-/// An incompressible neo-Hookean solid has the nominal stress P = E (λ − λ⁻²)/3. Its [conjugate
-/// stress](StrainMeasure::conjugate_stress) over the strain equals E only at small strain: at −9 %
-/// it is 1.28 E for Green–Lagrange and 0.96 E for Hencky.
-///
-/// # Errors
-/// [`ElasticityError::NoConjugateStress`], and [`ElasticityError::SingularDeformation`] for a
-/// strain without a stretch between 0.05 and 4.
-///
-/// ```
-/// use tactile_elasticity::modulus::neo_hookean_excess;
-/// use tactile_elasticity::strain::{GreenLagrange, Hencky};
-///
-/// // λ² = 0.82: (λ − λ⁻²)/(3 λ) = −0.1156.
-/// assert!((neo_hookean_excess(&GreenLagrange, -0.09)? - 0.284_f64).abs() < 1e-3);
-/// assert!((neo_hookean_excess(&Hencky, -0.09)? + 0.04).abs() < 0.01);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-pub fn neo_hookean_excess(
-    measure: &dyn StrainMeasure,
-    strain: f64,
-) -> Result<f64, ElasticityError> {
-    let stretch = stretch_of(measure, strain)?;
-    let nominal = (stretch - stretch.powi(-2)) / 3.0;
-    Ok(measure.conjugate_stress(nominal, stretch)? / strain - 1.0)
 }

@@ -55,7 +55,7 @@ fn contacts() {
         };
         let one = body(&case["E1"], &case["nu1"]);
         let other = body(&case["E2"], &case["nu2"]);
-        let reduced = reduced_modulus_pa(one, other).unwrap();
+        let reduced = one.reduced_modulus_pa(other).unwrap();
         let contact = HertzContact::from_force(number(&case["F"]), radius, reduced);
         let contact = contact.unwrap();
         let found = [
@@ -79,14 +79,9 @@ fn inverses() {
         let estimator = HertzSphere::new(radius, nu).unwrap().with_other_body(other);
         let exact = |key: &str| case[key].as_f64().map(Uncertain::exact);
         let bare = LoadState::new(Estimate::exact(force));
-        let by_radius = LoadState {
-            contact_radius_m: exact("a"),
-            ..bare
-        };
-        let by_indentation = LoadState {
-            indentation_m: exact("delta"),
-            ..bare
-        };
+        let [mut by_radius, mut by_indentation] = [bare; 2];
+        by_radius.contact_radius_m = exact("a");
+        by_indentation.indentation_m = exact("delta");
         for (key, load) in [("from_a", by_radius), ("from_delta", by_indentation)] {
             let expected = &case["expected"][key];
             if load == bare || expected.is_null() {
@@ -116,7 +111,7 @@ fn surfaces() {
     for case in of_kind("surface") {
         let [a, p0, e] = ["a", "p0", "E_star"].map(|key| number(&case[key]));
         for (i, r) in case["r"].as_array().unwrap().iter().enumerate() {
-            let found = hertz_surface_displacement_m(number(r), a, p0, e);
+            let found = HertzContact::surface_displacement_m(number(r), a, p0, e);
             close(&case, "u", found, number(&case["expected"]["u"][i]), 1e-12);
         }
     }

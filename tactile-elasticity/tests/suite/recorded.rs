@@ -84,7 +84,7 @@ fn contacts(answers: &mut Answers) {
     let hertz = HertzContact::from_force(0.05, 3e-3, 45e3).unwrap();
     for r in [0.0, 1e-3, 2.5e-3, 7e-3] {
         let (a, p0) = (hertz.contact_radius_m, hertz.peak_pressure_pa);
-        let u = hertz_surface_displacement_m(r, a, p0, hertz.reduced_modulus_pa);
+        let u = HertzContact::surface_displacement_m(r, a, p0, hertz.reduced_modulus_pa);
         answers.add(&format!("Hertz displacement {r}"), u);
     }
     for (name, bond, nu) in [
@@ -150,11 +150,10 @@ fn estimators(answers: &mut Answers) {
     let uncertain: Vec<_> = (scaled.iter())
         .map(|load| {
             let by_pixels = |number: Uncertain| number.by_relative(Source::PixelSize, 0.004);
-            LoadState {
-                contact_radius_m: load.contact_radius_m.map(by_pixels),
-                indentation_m: load.indentation_m.map(by_pixels),
-                ..*load
-            }
+            let mut load = *load;
+            load.contact_radius_m = load.contact_radius_m.map(by_pixels);
+            load.indentation_m = load.indentation_m.map(by_pixels);
+            load
         })
         .collect();
     let ball = Bodies::new(Object::sphere(radius), None).with_size_error(0.002);
@@ -162,9 +161,9 @@ fn estimators(answers: &mut Answers) {
     let scaled = LoadSeries::new(scaled);
     let on_guide = hertz.clone().with_waveguide(&gel);
     answers.estimate("Hertz on the guide", &on_guide, &uncertain);
-    let by_depth = loads().into_iter().map(|load| LoadState {
-        contact_radius_m: None,
-        ..load
+    let by_depth = loads().into_iter().map(|mut load| {
+        load.contact_radius_m = None;
+        load
     });
     let by_depth = LoadSeries::new(by_depth.collect::<Vec<_>>());
     answers.estimate("Hertz from indentation", &hertz, &by_depth);

@@ -4,7 +4,7 @@
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
 use tactile_elasticity::modulus::Estimate;
-use tactile_elasticity::relaxation::{TimeDependence, TimedModulus, time_dependence};
+use tactile_elasticity::relaxation::{TimeDependence, TimedModulus};
 
 /// E(t) = E∞ + (E₀ − E∞) e^{−t/τ}.
 #[derive(Clone, Copy)]
@@ -145,7 +145,7 @@ fn intervals_hold_the_solid() {
             let truth: Vec<_> = times.iter().map(|t| load(protocol, SOLID, *t)).collect();
             for seed in 0..SEEDS {
                 let series = measured(&times, &truth, errors, seed);
-                let TimeDependence::Relaxes(found) = time_dependence(&series, 0.0, 0.0).unwrap()
+                let TimeDependence::Relaxes(found) = TimeDependence::of(&series, 0.0, 0.0).unwrap()
                 else {
                     continue;
                 };
@@ -184,7 +184,7 @@ fn counted(
     let mut counts = [0; 4];
     for seed in 0..seeds {
         let series = measured(times_s, &truth, [0.0, 0.01], seed);
-        let told = match time_dependence(&series, 0.0, law_error).unwrap() {
+        let told = match TimeDependence::of(&series, 0.0, law_error).unwrap() {
             TimeDependence::Steady => 0,
             TimeDependence::Relaxes(_) => 1,
             TimeDependence::Drifts { .. } => 2,
@@ -266,7 +266,7 @@ fn scatter_beyond_the_errors_is_no_change() {
         for load in &mut series {
             load.youngs_modulus_pa.standard_error /= 3.0;
         }
-        let told = time_dependence(&series, 0.0, 0.0).unwrap();
+        let told = TimeDependence::of(&series, 0.0, 0.0).unwrap();
         alarms += usize::from(told != TimeDependence::Steady);
     }
     // The scatter is estimated from the same 20 loads, so that more than 1 % are expected. Without
@@ -282,7 +282,7 @@ fn what_all_loads_share_widens_the_moduli_alone() {
         .map(|t| load(Protocol::HeldApproach, SOLID, *t))
         .collect();
     let series = measured(&times, &truth, [0.0, 0.005], 1);
-    let solid = |scale_error: f64| match time_dependence(&series, scale_error, 0.0).unwrap() {
+    let solid = |scale_error: f64| match TimeDependence::of(&series, scale_error, 0.0).unwrap() {
         TimeDependence::Relaxes(solid) => solid,
         other => panic!("{other:?}"),
     };
@@ -314,14 +314,14 @@ fn what_is_no_series_is_refused() {
         (vec![load(0.0, 0.7, 1e5, f64::NAN)], "standard error must"),
         (vec![load(1.0, 0.7, 1e5, 1e3), good], "load 1 was at 0 s"),
     ] {
-        let error = time_dependence(&series, 0.0, 0.0).unwrap_err();
+        let error = TimeDependence::of(&series, 0.0, 0.0).unwrap_err();
         assert!(error.to_string().starts_with(message), "{error}");
     }
     for bad in [-0.1, f64::NAN] {
-        assert!(time_dependence(&[good], bad, 0.0).is_err());
-        assert!(time_dependence(&[good], 0.0, bad).is_err());
+        assert!(TimeDependence::of(&[good], bad, 0.0).is_err());
+        assert!(TimeDependence::of(&[good], 0.0, bad).is_err());
     }
-    let at_once = time_dependence(&[good; 7], 0.0, 0.0);
+    let at_once = TimeDependence::of(&[good; 7], 0.0, 0.0);
     assert_eq!(at_once, Ok(TimeDependence::Steady));
 }
 
@@ -339,7 +339,7 @@ fn few_loads_under_a_held_force_tell_the_change() {
             }
         })
         .collect();
-    match time_dependence(&series, 0.0, 0.0).unwrap() {
+    match TimeDependence::of(&series, 0.0, 0.0).unwrap() {
         TimeDependence::Undecided { change } => {
             // The compliances lie on the fitted line: rounding.
             assert!((change - (1.0 / 1.15 - 1.0)).abs() < 1e-9, "{change}");

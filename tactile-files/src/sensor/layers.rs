@@ -8,10 +8,7 @@ use super::findings::{LayerFinding, PressFinding, SensorError};
 use super::input::{Indenter, LayerInput};
 use crate::scene::{SceneLayer, elastic_layers};
 use nalgebra::{DMatrix, DVector};
-use tactile_imaging::elasticity::contact::{
-    Layer, PARABOLA_ERROR, PARAMETERS_PER_LAYER, guide_log_stiffness, parameter_slopes,
-    stepped_layers,
-};
+use tactile_imaging::elasticity::contact::Layer;
 use tactile_imaging::force::Estimate;
 
 /// A contact of a rigid ball.
@@ -123,9 +120,9 @@ pub(super) fn fit(
         return Ok(as_stated);
     };
     problem.plausible(&solution)?;
-    let count = PARAMETERS_PER_LAYER * n;
+    let count = Layer::PARAMETERS * n;
     let parameters = solution.parameters.rows(0, count).into_owned();
-    let fitted = stepped_layers(&layers, &parameters);
+    let fitted = Layer::stepped(&layers, &parameters);
     let Some(stiffness) = Stiffness::new(&fitted, &contacts) else {
         return Ok(as_stated);
     };
@@ -209,7 +206,7 @@ impl Stiffness {
         });
         let mut values = [0.0; NODES];
         for (value, node) in values.iter_mut().zip(nodes) {
-            *value = guide_log_stiffness(layers, f64::exp(node))?;
+            *value = Layer::log_stiffness(layers, f64::exp(node))?;
         }
         Some(Self { nodes, values })
     }
@@ -248,14 +245,14 @@ struct Solution {
 impl<'a> Problem<'a> {
     fn new(errors: &[[f64; 3]], balls: &'a [Ball], contacts: &'a [BallContact]) -> Self {
         let n = errors.len();
-        let layer_parameters = PARAMETERS_PER_LAYER * n;
+        let layer_parameters = Layer::PARAMETERS * n;
         let prior = DVector::from_fn(layer_parameters + balls.len() + 1, |k, _| {
             let error = if k < layer_parameters {
                 errors[k % n][k / n]
             } else {
                 balls
                     .get(k - layer_parameters)
-                    .map_or(PARABOLA_ERROR, |b| b.radius_error)
+                    .map_or(Layer::PARABOLA_ERROR, |b| b.radius_error)
             };
             error.max(EXACT)
         });
@@ -273,7 +270,7 @@ impl<'a> Problem<'a> {
     fn predicted(&self, layers: &[Layer], parameters: &DVector<f64>) -> Option<Vec<f64>> {
         let n = self.layer_parameters;
         let step = parameters.rows(0, n).into_owned();
-        let stiffness = Stiffness::new(&stepped_layers(layers, &step), self.contacts)?;
+        let stiffness = Stiffness::new(&Layer::stepped(layers, &step), self.contacts)?;
         let common = parameters[n + self.balls.len()];
         let log_force = |(c, model): (&BallContact, &f64)| {
             let ball_radius = self.balls[c.ball].radius_m.ln() + parameters[n + c.ball];
@@ -307,8 +304,7 @@ impl<'a> Problem<'a> {
             let here = self.predicted(layers, &parameters)?;
             // Parameters stated as exact are held fixed.
             let moves = |k: usize| self.prior[k] > EXACT;
-            let slopes =
-                parameter_slopes(&here, &parameters, moves, |x| self.predicted(layers, x))?;
+            let slopes = Layer::slopes(&here, &parameters, moves, |x| self.predicted(layers, x))?;
             // The priors keep the normal equations regular even if the presses determine nothing.
             let mut normal = DMatrix::from_diagonal(&self.prior.map(|sd| (sd * sd).recip()));
             let mut right = -(&normal * &parameters);

@@ -65,6 +65,7 @@ use tactile_tps::Smoothing;
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Neighbourhood {
     /// All points within the median of all pairwise distances of the set, the median included, as
     /// in the paper.
@@ -100,6 +101,7 @@ pub enum Neighbourhood {
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum LengthMaximum {
     /// The two edges compared, `max(d, e)`.
     #[default]
@@ -134,6 +136,7 @@ pub enum LengthMaximum {
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Compatibility {
     /// r = 1: the support counts neighbours (the method that the paper extends).
     Count,

@@ -27,6 +27,7 @@ const RARE: f64 = 0.01;
 #[allow(missing_docs)]
 #[cfg_attr(not(feature = "ablation"), allow(unreachable_pub))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Mechanism {
     Patterns,
     Reheat,
@@ -65,6 +66,7 @@ pub enum Mechanism {
     derive(serde::Serialize, serde::Deserialize),
     serde(rename_all = "snake_case")
 )]
+#[non_exhaustive]
 pub enum Rotation {
     /// Up to about 45°.
     #[default]
@@ -101,6 +103,7 @@ pub enum Rotation {
     derive(serde::Serialize, serde::Deserialize),
     serde(rename_all = "snake_case")
 )]
+#[non_exhaustive]
 pub enum Outliers {
     /// Points of both sets may lack a partner.
     #[default]
@@ -137,6 +140,7 @@ pub enum Outliers {
     derive(serde::Serialize, serde::Deserialize),
     serde(rename_all = "snake_case")
 )]
+#[non_exhaustive]
 pub enum Search {
     /// Tries further starts until an answer is exact or noise explains its residuals. Noisy answers
     /// are averaged over the scales of the prior. This suits any scene. Sets of four thousand
@@ -179,6 +183,7 @@ pub enum Search {
     derive(serde::Serialize, serde::Deserialize),
     serde(rename_all = "snake_case")
 )]
+#[non_exhaustive]
 pub enum Transformation {
     /// A smooth deformation.
     #[default]

@@ -21,7 +21,7 @@ impl ContactLaw for OwnLaw {
             ContactLength::Radius(a) => {
                 Reach::At(LogForce::new((4.0 / 3.0 * a.powi(3) / self.radius_m).ln()))
             }
-            ContactLength::Indentation(_) => Reach::NotMine,
+            _ => Reach::NotMine,
         }
     }
 }

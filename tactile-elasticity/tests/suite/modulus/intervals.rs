@@ -65,13 +65,8 @@ fn intervals_cover_where_lengths_and_the_guide_err_together() {
             let stated = Waveguide::new(layers.collect()).unwrap();
             let measured = loads.iter().map(|load| {
                 let a = load.contact_radius_m.unwrap().value * (1.0 + length_scale * both);
-                LoadState {
-                    contact_radius_m: Some(
-                        Uncertain::exact(a).by_relative(Source::PixelSize, length_scale),
-                    ),
-                    indentation_m: None,
-                    ..*load
-                }
+                let a = Uncertain::exact(a).by_relative(Source::PixelSize, length_scale);
+                by_radius(*load).with_radius(a)
             });
             let series = LoadSeries::new(measured.collect::<Vec<_>>());
             let series = series.with_bodies(std::sync::Arc::clone(&bodies));
@@ -126,9 +121,10 @@ fn a_source_is_one_error_in_all_loads() {
     assert!((found.by_source.share(Source::Gain) - 1.0).abs() < 1e-9);
     // As noise the error is independent in each load, and their mean is more accurate.
     let noisy: Vec<_> = (loads.iter())
-        .map(|load| LoadState {
-            force_n: load.force_n.by_relative(Source::Noise, 0.01),
-            ..*load
+        .map(|load| {
+            let mut load = *load;
+            load.force_n = load.force_n.by_relative(Source::Noise, 0.01);
+            load
         })
         .collect();
     let noisy = plain.estimate(&LoadSeries::new(noisy)).unwrap();
@@ -290,7 +286,7 @@ proptest! {
         let ball = SphereOnWaveguide::new(radius, 0.49, &guide, Bond::Bonded).unwrap();
         let modulus = 10f64.powf(ball_pa);
         let bodies = [(modulus, 0.49), (1e5, nu)].map(|(e, nu)| Body::elastic(e, nu).unwrap());
-        let reduced = reduced_modulus_pa(bodies[0], bodies[1]).unwrap();
+        let reduced = bodies[0].reduced_modulus_pa(bodies[1]).unwrap();
         let loads: Vec<_> = ratios
             .iter()
             .map(|ratio| {

@@ -97,7 +97,10 @@ fn a_rigid_flat_and_a_deep_layer_are_hertz() {
 fn far_stiffer_samples_are_bounded_from_below_only() {
     // A sample of 5 MPa on a waveguide of 50 kPa: with 1 % of noise in a there is no upper limit.
     let guide = waveguide();
-    let e = reduced_modulus_pa(guide.as_body(), Body::elastic(5e6, NU).unwrap()).unwrap();
+    let e = guide
+        .as_body()
+        .reduced_modulus_pa(Body::elastic(5e6, NU).unwrap())
+        .unwrap();
     let load = |f: f64, error: f64| {
         let a = HertzContact::from_force(f, 4e-3, e)
             .unwrap()

@@ -10,9 +10,7 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
 use tactile_elasticity::ElasticityError;
-use tactile_elasticity::contact::{
-    Body, Bond, HertzContact, Layer, LayerEquation, Waveguide, reduced_modulus_pa,
-};
+use tactile_elasticity::contact::{Body, Bond, HertzContact, Layer, LayerEquation, Waveguide};
 use tactile_elasticity::modulus::*;
 
 const SAMPLE: f64 = 60e3;
@@ -39,12 +37,16 @@ fn waveguide() -> Waveguide {
 }
 
 fn reduced() -> f64 {
-    reduced_modulus_pa(Body::rigid(), Body::elastic(SAMPLE, NU).unwrap()).unwrap()
+    Body::rigid()
+        .reduced_modulus_pa(Body::elastic(SAMPLE, NU).unwrap())
+        .unwrap()
 }
 
 /// Hertz loads of a 4 mm sphere of the sample on `other`.
 fn hertz_loads(other: Body, forces: &[f64]) -> Vec<LoadState> {
-    let e = reduced_modulus_pa(other, Body::elastic(SAMPLE, NU).unwrap()).unwrap();
+    let e = other
+        .reduced_modulus_pa(Body::elastic(SAMPLE, NU).unwrap())
+        .unwrap();
     (forces.iter())
         .map(|&f| {
             let c = HertzContact::from_force(f, 4e-3, e).unwrap();
@@ -56,19 +58,15 @@ fn hertz_loads(other: Body, forces: &[f64]) -> Vec<LoadState> {
 }
 
 /// A load without its measured depth.
-fn by_radius(load: LoadState) -> LoadState {
-    LoadState {
-        indentation_m: None,
-        ..load
-    }
+fn by_radius(mut load: LoadState) -> LoadState {
+    load.indentation_m = None;
+    load
 }
 
 /// A load without its contact radius.
-fn by_depth(load: LoadState) -> LoadState {
-    LoadState {
-        contact_radius_m: None,
-        ..load
-    }
+fn by_depth(mut load: LoadState) -> LoadState {
+    load.contact_radius_m = None;
+    load
 }
 
 /// Loads whose forces have a common relative error of this size.
