@@ -1,8 +1,9 @@
 //! The first stage: from a frame to contact, force, centroid and radius.
 use super::error::PipelineError;
+use crate::core::StopReason;
 use crate::force::{
     BoundingBox, Estimate, FaceReading, ForceError, ForceMeasurement, ForceWorkspace, LensGeometry,
-    LocalCalibration, Polarity, ProfileShape, ReferenceFrame, StopReason, Uncertain,
+    LocalCalibration, Polarity, ProfileShape, ReferenceFrame, Uncertain,
 };
 use ndarray::{Array2, ArrayView2};
 use std::f64::consts::PI;

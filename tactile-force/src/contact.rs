@@ -88,7 +88,7 @@ pub(crate) struct Detection {
 ///
 /// let options = ContactOptions::default()
 ///     .with_polarity(Polarity::Brighter)
-///     .with_drift(DriftCorrection::Offset)
+///     .with_drift(DriftCorrection::None)
 ///     .with_saturation_limit(0.05)?
 ///     .with_false_alarm_rate(1e-6)?;
 /// assert_ne!(options, ContactOptions::default());

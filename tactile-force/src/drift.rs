@@ -43,13 +43,10 @@ const BOTH: f64 = 16.0;
 ///     assert!(m.contact.is_none(), "a change of light is not a contact");
 ///     Ok(m.drift)
 /// };
-/// // Three grey levels of uniform stray light, and illumination that is a tenth brighter.
-/// let stray = drift(DriftCorrection::Offset, 20, 23)?;
-/// assert!((stray.coefficients[0] - 3.0).abs() < 1e-9);
-/// let brighter = drift(DriftCorrection::Illumination, 100, 110)?;
+/// // Illumination that is a tenth brighter.
+/// let brighter = drift(DriftCorrection::Automatic, 100, 110)?;
 /// assert!((brighter.coefficients[0] - 1.1).abs() < 1e-9);
-/// let automatic = drift(DriftCorrection::Automatic, 100, 103)?;
-/// assert_eq!((automatic.outcome, automatic.tiles), (DriftOutcome::Corrected, 20 * 5));
+/// assert_eq!((brighter.outcome, brighter.tiles), (DriftOutcome::Corrected, 20 * 5));
 /// // A black background reveals nothing about the illumination.
 /// let black = drift(DriftCorrection::Automatic, 0, 0)?;
 /// assert!(matches!(black.outcome, DriftOutcome::TooDark { .. }));
@@ -62,14 +59,8 @@ pub enum DriftCorrection {
     /// Frames are not corrected.
     #[default]
     None,
-    /// Uniform additional stray light: d = f − r − b.
-    Offset,
-    /// Stray light with a gradient: d = f − r − (b + bₓ x + b_y y).
-    Plane,
-    /// Brighter or darker illumination, for background and signal alike: d = f/g − r.
-    Illumination,
-    /// Illumination whose distribution also changed, for example by a moved LED: d = f/(g + gₓ x +
-    /// g_y y) − r.
+    /// Illumination whose distribution changed, for example by a moved LED: d = f/(g + gₓ x + g_y
+    /// y) − r.
     TiltedIllumination,
     /// Illumination g and stray light b together, d = (f − b)/g − r, if the frame reveals its level
     /// ([`DriftOutcome`]); otherwise no correction. The structure of the background reveals which
@@ -108,27 +99,8 @@ pub enum DriftOutcome {
     },
 }
 
-impl DriftCorrection {
-    fn is_multiplicative(self) -> bool {
-        matches!(
-            self,
-            Self::Illumination | Self::TiltedIllumination | Self::Automatic
-        )
-    }
-
-    fn terms(self) -> usize {
-        match self {
-            Self::None => 0,
-            Self::Offset | Self::Illumination | Self::Automatic => 1,
-            Self::Plane | Self::TiltedIllumination => 3,
-        }
-    }
-}
-
-/// The drift found in one frame. `coefficients` are [value, per column, per row] relative to the
-/// centre of the frame: grey levels for stray light, relative values for illumination. See
-/// [`DriftCorrection`] for an example.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// The drift found in one frame. See [`DriftCorrection`] for an example.
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct IlluminationDrift {
@@ -136,8 +108,8 @@ pub struct IlluminationDrift {
     pub correction: DriftCorrection,
     /// Whether the drift is known.
     pub outcome: DriftOutcome,
-    /// Offset (grey levels) or relative illumination (1 for unchanged) at the centre of the frame,
-    /// and its change per column and per row.
+    /// Illumination at the centre of the frame relative to that of the reference, and its change
+    /// per column and per row.
     pub coefficients: [f64; 3],
     /// Stray light in addition to the illumination, in grey levels.
     pub stray_grey: f64,
@@ -155,10 +127,27 @@ pub struct IlluminationDrift {
     reference: f64,
 }
 
+impl Default for IlluminationDrift {
+    /// Unchanged light.
+    fn default() -> Self {
+        Self {
+            correction: DriftCorrection::None,
+            outcome: DriftOutcome::NotRequested,
+            coefficients: [1.0, 0.0, 0.0],
+            stray_grey: 0.0,
+            scale_variance: 0.0,
+            standard_error: 0.0,
+            tiles: 0,
+            middle: [0.0; 2],
+            covariance: [[0.0; 3]; 3],
+            reference: 0.0,
+        }
+    }
+}
+
 /// The correction along one row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DriftLine {
-    multiplicative: bool,
     start: f32,
     step: f32,
     stray: f32,
@@ -170,11 +159,7 @@ impl DriftLine {
     pub(crate) fn difference(&self, x: usize, frame: f32, reference: f32) -> f32 {
         // Frames are narrower than 2³¹, and this conversion has SIMD instructions.
         let level = self.start + self.step * (x as i32) as f32;
-        if self.multiplicative {
-            (frame - self.stray) / level - reference
-        } else {
-            frame - reference - level
-        }
+        (frame - self.stray) / level - reference
     }
 }
 
@@ -191,7 +176,6 @@ impl IlluminationDrift {
         // from there.
         let start = value + per_column * x + per_row * y;
         DriftLine {
-            multiplicative: self.correction.is_multiplicative(),
             start: start as f32,
             step: per_column as f32,
             stray: self.stray_grey as f32,
@@ -208,25 +192,16 @@ impl IlluminationDrift {
                 variance += at[i] * self.covariance[i][j] * at[j];
             }
         }
-        if self.correction.is_multiplicative() {
-            [
-                variance * self.reference * self.reference,
-                variance + self.scale_variance,
-            ]
-        } else {
-            [variance, 0.0]
-        }
+        [
+            variance * self.reference * self.reference,
+            variance + self.scale_variance,
+        ]
     }
 
     /// Background that the correction subtracts from a frame at a position, for a reference level
     /// of `reference`.
     fn level(&self, x: f64, y: f64, reference: f64) -> f64 {
-        let at = self.at(x, y);
-        if self.correction.is_multiplicative() {
-            reference * (at - 1.0) + self.stray_grey
-        } else {
-            at
-        }
+        reference * (self.at(x, y) - 1.0) + self.stray_grey
     }
 
     #[inline]
@@ -252,13 +227,8 @@ impl IlluminationDrift {
     /// The summed difference of a tile after the correction.
     #[inline]
     pub(crate) fn residual(&self, tile: &TileSum) -> f64 {
-        let at = self.at(tile.x, tile.y);
-        let background = if self.correction.is_multiplicative() {
-            tile.reference * (at - 1.0) + tile.pixels * self.stray_grey
-        } else {
-            tile.pixels * at
-        };
-        tile.difference - background
+        let illumination = tile.reference * (self.at(tile.x, tile.y) - 1.0);
+        tile.difference - illumination - tile.pixels * self.stray_grey
     }
 
     /// The automatic correction if its error is small enough; otherwise none, with the reason.
@@ -300,22 +270,20 @@ impl IlluminationDrift {
             return refused(DriftOutcome::OtherLight { ratio });
         }
         Self {
-            correction: DriftCorrection::Illumination,
             outcome: DriftOutcome::Corrected,
             ..self
         }
     }
 
-    /// One least-squares step of the first `TERMS` coefficients, using the tiles whose level per
-    /// pixel is within a limit. `sd` is the noise of one pixel. Returns the number of tiles.
+    /// One least-squares step of the coefficients, using the tiles whose level per pixel is within a
+    /// limit. `sd` is the noise of one pixel. Returns the number of tiles.
     ///
     /// Positions are relative to the centre of the frame, in units of half the frame.
-    fn step<const TERMS: usize>(&mut self, tiles: &[TileSum], limit: f64, sd: f64) -> usize {
+    fn step(&mut self, tiles: &[TileSum], limit: f64, sd: f64) -> usize {
         // Slopes per half frame give the three columns similar sizes, and the matrix a good
         // condition number.
         let scale = [1.0, self.middle[0].max(1.0), self.middle[1].max(1.0)];
-        let (mut matrix, mut right) = (Matrix3::<f64>::identity(), Vector3::<f64>::zeros());
-        matrix.view_mut((0, 0), (TERMS, TERMS)).fill(0.0);
+        let (mut matrix, mut right) = (Matrix3::<f64>::zeros(), Vector3::<f64>::zeros());
         let (mut count, mut reference, mut pixels) = (0, 0.0, 0.0);
         for tile in tiles {
             let residual = self.residual(tile);
@@ -323,20 +291,15 @@ impl IlluminationDrift {
             if !is_near {
                 continue;
             }
-            let weight = self.weight(tile);
-            let at = [
+            let slopes = Vector3::new(
                 1.0,
                 (tile.x - self.middle[0]) / scale[1],
                 (tile.y - self.middle[1]) / scale[2],
-            ];
-            for i in 0..TERMS {
-                // The variance of a tile's sum is proportional to its number of pixels.
-                let by = weight * at[i] / tile.pixels;
-                right[i] += by * residual;
-                for j in 0..TERMS {
-                    matrix[(i, j)] += by * weight * at[j];
-                }
-            }
+            ) * weight(tile);
+            // The variance of a tile's sum is proportional to its number of pixels.
+            let by = slopes / tile.pixels;
+            right += by * residual;
+            matrix += by * slopes.transpose();
             count += 1;
             reference += tile.reference;
             pixels += tile.pixels;
@@ -345,9 +308,9 @@ impl IlluminationDrift {
             return count;
         };
         let step = inverse * right;
-        for i in 0..TERMS {
+        for i in 0..3 {
             self.coefficients[i] += step[i] / scale[i];
-            for j in 0..TERMS {
+            for j in 0..3 {
                 self.covariance[i][j] = inverse[(i, j)] * sd * sd / (scale[i] * scale[j]);
             }
         }
@@ -367,10 +330,7 @@ impl IlluminationDrift {
         // contains the noise of its own reference level, which would cause a spurious slope.
         let mut before = None;
         for tile in tiles.iter().filter(near) {
-            let (own, change) = (
-                self.weight(tile) / tile.pixels,
-                tile.difference / tile.pixels,
-            );
+            let (own, change) = (weight(tile) / tile.pixels, tile.difference / tile.pixels);
             let other = before.replace(own).unwrap_or(own);
             let products = [
                 own,
@@ -430,15 +390,11 @@ impl IlluminationDrift {
         self.covariance[0][0] = self.standard_error.powi(2);
         count
     }
+}
 
-    /// Derivative of a tile's sum by the first coefficient.
-    fn weight(&self, tile: &TileSum) -> f64 {
-        if self.correction.is_multiplicative() {
-            tile.reference.max(1.0)
-        } else {
-            tile.pixels
-        }
-    }
+/// Derivative of a tile's sum by the illumination.
+fn weight(tile: &TileSum) -> f64 {
+    tile.reference.max(1.0)
 }
 
 /// Buffers of the fit.
@@ -470,16 +426,9 @@ pub(crate) fn fit(
         middle: [0.5 * (columns as f64 - 1.0), 0.5 * (rows as f64 - 1.0)],
         ..IlluminationDrift::default()
     };
-    if correction.is_multiplicative() {
-        drift.coefficients[0] = 1.0;
-    }
     let automatic = correction == DriftCorrection::Automatic;
     values.clear();
-    values.extend(
-        tiles
-            .iter()
-            .map(|tile| drift.residual(tile) / drift.weight(tile)),
-    );
+    values.extend(tiles.iter().map(|tile| drift.residual(tile) / weight(tile)));
     // A contact that covers less than half of the tiles shifts the median only slightly.
     drift.coefficients[0] += median(values, scratch);
     let noise = sd / ((TILE_ROWS * TILE_COLUMNS) as f64).sqrt();
@@ -491,10 +440,9 @@ pub(crate) fn fit(
         // noise.
         let limit = 3.0 * (1.4826 * median(values, scratch)).max(noise);
         let before = drift.tiles;
-        drift.tiles = match correction.terms() {
-            _ if automatic => drift.step_both(tiles, limit, sd, limit / (3.0 * noise)),
-            1 => drift.step::<1>(tiles, limit, sd),
-            _ => drift.step::<3>(tiles, limit, sd),
+        drift.tiles = match automatic {
+            true => drift.step_both(tiles, limit, sd, limit / (3.0 * noise)),
+            false => drift.step(tiles, limit, sd),
         };
         // An equal number of tiles nearly always means the same tiles, so the fit has converged.
         if drift.tiles == before {

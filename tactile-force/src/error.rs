@@ -116,3 +116,20 @@ impl ForceError {
         Self::Custom(CustomError::new(error))
     }
 }
+
+/// Rejects observations that are not finite, or fewer than a fit requires.
+pub(crate) fn check_observations<T, const N: usize>(
+    observations: &[T],
+    required: usize,
+    numbers: impl Fn(&T) -> [f64; N],
+) -> Result<(), ForceError> {
+    let is_finite = |o: &T| numbers(o).iter().all(|number| number.is_finite());
+    if let Some(index) = observations.iter().position(|o| !is_finite(o)) {
+        return Err(ForceError::NonFinitePair { index });
+    }
+    let found = observations.len();
+    if found < required {
+        return Err(ForceError::TooFewPairs { required, found });
+    }
+    Ok(())
+}

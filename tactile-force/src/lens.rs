@@ -4,7 +4,7 @@
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 use tactile_core::{Estimate, Requirement, StopReason};
 
-use crate::error::ForceError;
+use crate::error::{ForceError, check_observations};
 
 /// The map from pixels to undistorted metres: pixel sizes h_x and h_y, and Brown's radial
 /// distortion about a centre c.
@@ -323,16 +323,9 @@ impl LensFit {
         dots: &[DotPair],
         (rows, columns): (usize, usize),
     ) -> Result<Self, ForceError> {
-        if dots.len() < FEWEST_DOTS {
-            return Err(ForceError::TooFewPairs {
-                required: FEWEST_DOTS,
-                found: dots.len(),
-            });
-        }
-        let finite = |d: &DotPair| d.pixel.iter().chain(&d.target_m).all(|v| v.is_finite());
-        if let Some(index) = dots.iter().position(|d| !finite(d)) {
-            return Err(ForceError::NonFinitePair { index });
-        }
+        check_observations(dots, FEWEST_DOTS, |d| {
+            [d.pixel[0], d.pixel[1], d.target_m[0], d.target_m[1]]
+        })?;
         let centre = [0.5 * (columns as f64 - 1.0), 0.5 * (rows as f64 - 1.0)];
         let radius = centre[0].hypot(centre[1]).max(1.0);
         let mut problem = Problem {

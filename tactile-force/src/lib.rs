@@ -66,5 +66,5 @@ pub use measure::{ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, me
 pub use noise::{DifferenceNoise, NoiseModel};
 pub use profile::{HertzFit, ProfileShape};
 pub use shear::{ShearCalibration, ShearMeasurement, ShearPair, ShearTracker};
-pub use tactile_core::{BoundingBox, Estimate, Polarity, Source, StopReason, Uncertain};
-pub use {nalgebra, ndarray};
+pub use tactile_core::{BoundingBox, Estimate, Polarity, Source, Uncertain};
+pub use {nalgebra, ndarray, tactile_core};

@@ -1,6 +1,6 @@
 //! Shear from the displacement of the centroid: F_x = K_x u_x, F_y = K_y u_y (equations (9)–(12)).
 
-use crate::error::ForceError;
+use crate::error::{ForceError, check_observations};
 use tactile_core::Estimate;
 
 /// One observation for the shear calibration: the displacement of the centroid under a known shear
@@ -71,21 +71,10 @@ impl ShearCalibration {
     /// An error for fewer than two pairs, a pair that is not finite, or an axis without
     /// displacement.
     pub fn fit(pairs: &[ShearPair]) -> Result<Self, ForceError> {
-        if pairs.len() < 2 {
-            return Err(ForceError::TooFewPairs {
-                required: 2,
-                found: pairs.len(),
-            });
-        }
-        let finite = |p: &ShearPair| {
-            p.centroid_step_m
-                .iter()
-                .chain(&p.force_n)
-                .all(|v| v.is_finite())
-        };
-        if let Some(index) = pairs.iter().position(|p| !finite(p)) {
-            return Err(ForceError::NonFinitePair { index });
-        }
+        check_observations(pairs, 2, |p| {
+            let ([u_x, u_y], [f_x, f_y]) = (p.centroid_step_m, p.force_n);
+            [u_x, u_y, f_x, f_y]
+        })?;
         let [(k_x, sd_x), (k_y, sd_y)] = [stiffness(pairs, 0)?, stiffness(pairs, 1)?];
         Ok(Self {
             residual_sd_n: [sd_x, sd_y],

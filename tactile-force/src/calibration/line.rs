@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Vector2};
 use tactile_core::Estimate;
 
 use super::{Branch, CalibrationPair, StressCalibration};
-use crate::error::ForceError;
+use crate::error::{ForceError, check_observations};
 
 /// A straight line from integrated pixel value to force, F = b + s V, or F = s V through the
 /// origin.
@@ -66,7 +66,9 @@ impl LinearCalibration {
 
     fn fitted(pairs: &[CalibrationPair], through_origin: bool) -> Result<Self, ForceError> {
         let columns = if through_origin { 1 } else { 2 };
-        check_pairs(pairs, columns)?;
+        check_observations(pairs, columns + 1, |p| {
+            [p.integrated_pixel_value, p.force_n]
+        })?;
         let values: Vec<f64> = pairs.iter().map(|p| p.integrated_pixel_value).collect();
         let forces: Vec<f64> = pairs.iter().map(|p| p.force_n).collect();
         // Centring and scaling of the pixel values decorrelate the two parameters.
@@ -168,22 +170,6 @@ impl StressCalibration for LinearCalibration {
     fn range(&self) -> [f64; 2] {
         self.range
     }
-}
-
-/// Rejects pairs that cannot be fitted: too few for the parameters, or not finite.
-fn check_pairs(pairs: &[CalibrationPair], parameters: usize) -> Result<(), ForceError> {
-    let finite =
-        |p: &CalibrationPair| p.integrated_pixel_value.is_finite() && p.force_n.is_finite();
-    if let Some(index) = pairs.iter().position(|p| !finite(p)) {
-        return Err(ForceError::NonFinitePair { index });
-    }
-    if pairs.len() <= parameters {
-        return Err(ForceError::TooFewPairs {
-            required: parameters + 1,
-            found: pairs.len(),
-        });
-    }
-    Ok(())
 }
 
 /// The difference between loading and unloading.

@@ -73,7 +73,7 @@ pub enum ProfileShape {
 /// let fit: HertzFit = measured.profile.expect("a profile");
 /// assert!((fit.radius_px.value - 30.0).abs() < 0.02);
 /// assert!((fit.centre_px[0].value - 60.3).abs() < 0.01 && (fit.peak.value - 150.0).abs() < 0.3);
-/// assert_eq!(fit.stop, StopReason::Converged);
+/// assert_eq!(fit.stop, tactile_core::StopReason::Converged);
 /// # Ok::<(), ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]

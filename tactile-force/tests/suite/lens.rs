@@ -4,7 +4,7 @@
 use proptest::prelude::*;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::{Distribution, Normal};
-use tactile_force::{DotPair, ForceError, LensFit, LensGeometry, StopReason};
+use tactile_force::{DotPair, ForceError, LensFit, LensGeometry};
 
 const SHAPE: (usize, usize) = (1042, 1392);
 const CENTRE: [f64; 2] = [695.5, 520.5];
@@ -48,7 +48,7 @@ fn target(barrel: f64, noise: f64, seed: u64, mirror: bool) -> Vec<DotPair> {
 #[test]
 fn a_barrel_of_three_percent_and_oblong_pixels_are_recovered() {
     let fit = LensFit::from_dots(&target(0.03, 0.02, 1, false), SHAPE).unwrap();
-    assert_eq!(fit.stop, StopReason::Converged);
+    assert_eq!(fit.stop, tactile_core::StopReason::Converged);
     let aspect = fit.pixel_size_m[1].value / fit.pixel_size_m[0].value;
     assert!(
         (aspect / (SIZE[1] / SIZE[0]) - 1.0).abs() < 1e-4,

@@ -37,7 +37,7 @@ fn measuring_with_a_workspace_allocates_nothing() {
     let mut tracker = ShearTracker::new(ShearCalibration::fit(&shear_pairs).unwrap());
     for drift in [
         DriftCorrection::None,
-        DriftCorrection::Plane,
+        DriftCorrection::Automatic,
         DriftCorrection::TiltedIllumination,
     ] {
         let contact = ContactOptions::default().with_drift(drift);

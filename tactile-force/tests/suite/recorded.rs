@@ -198,20 +198,18 @@ fn frames(answers: &mut Answers) {
     let options = || ForceOptions::default().with_contact(contact);
     let drift = |correction| options().with_contact(contact.with_drift(correction));
     let darker_contact = contact.with_polarity(Polarity::Darker);
-    let cases: [(&str, &ReferenceFrame, &Array2<u8>, ForceOptions); 11] = [
+    let cases: [(&str, &ReferenceFrame, &Array2<u8>, ForceOptions); 9] = [
         ("quiet", &plain, &quiet[1], options()),
         ("firm", &plain, &firm, options()),
         ("firm mean", &mean, &firm, options()),
         ("firm flat", &flat, &firm, options()),
         ("faint", &mean, &faint, options()),
         ("no profile", &plain, &firm, options().without_profile()),
-        ("offset", &plain, &brighter, drift(DriftCorrection::Offset)),
-        ("plane", &plain, &brighter, drift(DriftCorrection::Plane)),
         (
             "brighter",
             &plain,
             &brighter,
-            drift(DriftCorrection::Illumination),
+            drift(DriftCorrection::Automatic),
         ),
         (
             "tilted",
