@@ -33,7 +33,7 @@ fn default_of(
         } => BondedLayer::new(indenter_radius_m, thickness_m, nu, Bond::Bonded).and_then(shared),
         Object::Cone { half_angle_rad, .. } => shared(Cone::new(half_angle_rad, nu)?),
         Object::FlatPunch { .. } => shared(paper_ratio(object)?),
-        _ => shared(StressStrainRegression::default()),
+        _ => shared(StressStrainRegression),
     }
 }
 
@@ -58,7 +58,7 @@ pub(super) fn that_fit(
             }
             _ => {}
         }
-        estimators.push(shared(StressStrainRegression::default())?);
+        estimators.push(shared(StressStrainRegression)?);
         Ok(estimators)
     };
     let bodies = Arc::new(Bodies::new(object, waveguide.cloned()));
@@ -86,7 +86,7 @@ fn named(
     let built = match choice {
         EstimatorChoice::Best => default_of(object, waveguide),
         EstimatorChoice::PaperRatio => paper_ratio(object).and_then(shared),
-        EstimatorChoice::Regression => shared(StressStrainRegression::default()),
+        EstimatorChoice::Regression => shared(StressStrainRegression),
         EstimatorChoice::Sphere => HertzSphere::new(radius()?, nu).and_then(shared),
         EstimatorChoice::SphereOnWaveguide => {
             on_waveguide(radius()?, nu, waveguide).and_then(shared)

@@ -14,7 +14,8 @@ use tactile_core::{Interval, Source, Uncertain};
 ///
 /// Each load has the weight 1/(σ_S² + E²σ_e²) (York's effective variance without correlation).
 /// Without standard errors all weights are equal, and the error is estimated from the scatter. It
-/// needs at least two loads, or three if neither errors nor a zero intercept are given.
+/// needs at least two loads, or three without errors. A significant intercept gives a warning, for
+/// example of a gauge that was not tared.
 ///
 /// ```
 /// use tactile_elasticity::modulus::{
@@ -26,45 +27,14 @@ use tactile_core::{Interval, Source, Uncertain};
 ///         .with_strain(Estimate::new(strain, 1e-4))
 /// };
 /// let loads = LoadSeries::new([load(600.0, 0.01), load(1200.0, 0.02), load(2400.0, 0.04)]);
-/// let modulus = StressStrainRegression::default().estimate(&loads)?;
+/// let modulus = StressStrainRegression.estimate(&loads)?;
 /// assert!((modulus.youngs_modulus_pa - 60e3).abs() < 1e-6);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct StressStrainRegression {
-    zero_at_origin: bool,
-}
+pub struct StressStrainRegression;
 
 impl StressStrainRegression {
-    /// Forces the line through the origin. By default it has an intercept, and a significant
-    /// intercept gives a warning.
-    ///
-    /// ```
-    /// use tactile_elasticity::modulus::{
-    ///     Estimate, LoadSeries, LoadState, ModulusEstimator, StressStrainRegression, Warning,
-    /// };
-    ///
-    /// // Stress that starts at 300 Pa, from a gauge that was not tared.
-    /// let loads = [0.01, 0.02, 0.03, 0.04].map(|strain: f64| LoadState::new(Estimate::new((300.0 + 60e3 * strain) * 1e-4, 1e-4))
-    ///     .with_area(Estimate::exact(1e-4))
-    ///     .with_strain(Estimate::exact(strain)));
-    /// let (loads, line) = (LoadSeries::new(loads), StressStrainRegression::default());
-    /// let tested = line.estimate(&loads)?;
-    /// assert!(
-    ///     tested
-    ///         .warnings
-    ///         .iter()
-    ///         .any(|w| matches!(w, Warning::Intercept { .. }))
-    /// );
-    /// let forced = line.with_zero_at_origin().estimate(&loads)?;
-    /// assert!(forced.youngs_modulus_pa > tested.youngs_modulus_pa);
-    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
-    /// ```
-    pub fn with_zero_at_origin(mut self) -> Self {
-        self.zero_at_origin = true;
-        self
-    }
-
     pub(super) fn points(loads: &[LoadState]) -> Result<Vec<Point>, ElasticityError> {
         let mut points = Vec::new();
         for (load, state) in loads.iter().enumerate() {
@@ -80,10 +50,10 @@ impl StressStrainRegression {
     }
 
     /// The line, whose slope must be positive.
-    pub(super) fn line(&self, points: &[Point]) -> Result<Line, ElasticityError> {
+    pub(super) fn line(points: &[Point]) -> Result<Line, ElasticityError> {
         let known = Self::known(points);
-        self.check(points, known)?;
-        let line = Line::fit(points, !self.zero_at_origin, known);
+        Self::check(points, known)?;
+        let line = Line::fit(points, known);
         if line.slope <= 0.0 || !line.slope.is_finite() {
             let p = points
                 .last()
@@ -103,13 +73,8 @@ impl StressStrainRegression {
             .any(|p| [p.stress, p.strain].iter().any(|x| noise(x) > 0.0))
     }
 
-    fn check(&self, points: &[Point], known: bool) -> Result<(), ElasticityError> {
-        let through_origin = self.zero_at_origin;
-        let expected = match (through_origin, known) {
-            (true, true) => 1,
-            (false, false) => 3,
-            _ => 2,
-        };
+    fn check(points: &[Point], known: bool) -> Result<(), ElasticityError> {
+        let expected = if known { 2 } else { 3 };
         if points.len() < expected {
             return Err(ElasticityError::TooFewLoads {
                 expected,
@@ -117,13 +82,10 @@ impl StressStrainRegression {
             });
         }
         let same = |f: fn(&Point) -> f64| points.windows(2).all(|w| f(&w[0]) == f(&w[1]));
-        if through_origin && points.iter().all(|p| p.strain.value == 0.0) {
-            return Err(ElasticityError::ZeroStrain);
-        }
-        if !through_origin && same(|p| p.stress.value) {
+        if same(|p| p.stress.value) {
             return Err(ElasticityError::EqualLoads);
         }
-        if !through_origin && same(|p| p.strain.value) {
+        if same(|p| p.strain.value) {
             return Err(ElasticityError::ZeroStrain);
         }
         Ok(())
@@ -157,7 +119,7 @@ impl StressStrainRegression {
         slope.by_estimated(Source::Noise, line.slope_error, degrees)
     }
 
-    fn warnings(&self, loads: &[LoadState], line: &Line) -> Vec<Warning> {
+    fn warnings(loads: &[LoadState], line: &Line) -> Vec<Warning> {
         let mut warnings = strain_warnings(loads);
         warnings.extend(line.excess.map(|x| Warning::ExcessScatter {
             reduced_chi_squared: x,
@@ -204,7 +166,7 @@ impl ModulusEstimator for StressStrainRegression {
         let loads = series.loads();
         let points = Self::points(loads)?;
         let known = Self::known(&points);
-        let line = self.line(&points)?;
+        let line = Self::line(&points)?;
         let by_source = Self::by_source(&points, &line);
         let total = by_source.total();
         let reach = total.standard_error * quantile_95(total.degrees_of_freedom);
@@ -216,7 +178,7 @@ impl ModulusEstimator for StressStrainRegression {
             estimator: EstimatorKind::StressStrainRegression,
             loads: diagnostics(&points, &line, known, loads.len()),
             fit: FitStatistics::new(points.len(), points.len() - line.degrees, line.chi_squared),
-            warnings: self.warnings(loads, &line),
+            warnings: Self::warnings(loads, &line),
         })
     }
 
@@ -258,11 +220,10 @@ fn noise(number: &Uncertain) -> f64 {
 }
 
 impl Line {
-    /// The line through the points, or through the points and the origin. It is weighted by the
-    /// errors of the points if they are known. The weights depend on the slope, so the fit is
-    /// iterated.
-    fn fit(points: &[Point], free: bool, known: bool) -> Self {
-        let mut line = Self::weighted(points, |_| 1.0, free, false);
+    /// The line through the points, weighted by their errors if they are known. The weights depend
+    /// on the slope, so the fit is iterated.
+    fn fit(points: &[Point], known: bool) -> Self {
+        let mut line = Self::weighted(points, |_| 1.0, false);
         if !known {
             return line;
         }
@@ -270,7 +231,7 @@ impl Line {
             let slope = line.slope;
             let variance = |p: &Point| p.spread(slope).powi(2);
             let floor = points.iter().map(variance).fold(0.0, f64::max) * 1e-12;
-            line = Self::weighted(points, |p| 1.0 / variance(p).max(floor), free, true);
+            line = Self::weighted(points, |p| 1.0 / variance(p).max(floor), true);
             if (line.slope - slope).abs() <= 1e-12 * slope.abs() {
                 break;
             }
@@ -279,37 +240,26 @@ impl Line {
     }
 
     /// Weighted least squares about the weighted centre, which decorrelates the two parameters.
-    fn weighted(points: &[Point], weight: impl Fn(&Point) -> f64, free: bool, known: bool) -> Self {
+    fn weighted(points: &[Point], weight: impl Fn(&Point) -> f64, known: bool) -> Self {
         let sum = |f: &dyn Fn(&Point) -> f64| points.iter().map(|p| weight(p) * f(p)).sum::<f64>();
         let total = sum(&|_| 1.0);
-        let (cx, cy) = if free {
-            (
-                sum(&|p| p.strain.value) / total,
-                sum(&|p| p.stress.value) / total,
-            )
-        } else {
-            (0.0, 0.0)
-        };
+        let cx = sum(&|p| p.strain.value) / total;
+        let cy = sum(&|p| p.stress.value) / total;
         let sxx = sum(&|p| (p.strain.value - cx).powi(2));
         let slope = sum(&|p| (p.strain.value - cx) * (p.stress.value - cy)) / sxx;
         let intercept = cy - slope * cx;
         let chi_squared = sum(&|p| (p.stress.value - intercept - slope * p.strain.value).powi(2));
-        let degrees = points.len() - if free { 2 } else { 1 };
+        let degrees = points.len() - 2;
         let reduced = chi_squared / degrees.max(1) as f64;
         let excess = (known && degrees > 0 && chi_squared_tail(chi_squared, degrees) < 1e-3)
             .then_some(reduced);
         let learnt = !known || excess.is_some();
         let unit = if learnt { reduced } else { 1.0 };
-        let intercept_variance = if free {
-            unit * (1.0 / total + cx * cx / sxx)
-        } else {
-            0.0
-        };
         Self {
             slope,
             intercept,
             slope_error: (unit / sxx).sqrt(),
-            intercept_error: intercept_variance.sqrt(),
+            intercept_error: (unit * (1.0 / total + cx * cx / sxx)).sqrt(),
             chi_squared,
             degrees,
             learnt,

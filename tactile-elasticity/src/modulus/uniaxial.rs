@@ -58,7 +58,7 @@ const STRETCHES: [f64; 2] = [0.05, 4.0];
 /// assert!((uniaxial.unloaded_area_m2 / 1e-4 - 1.0).abs() < 1e-9);
 /// let [_lateral, axial] = uniaxial.stretches[1];
 /// assert!((axial - 0.9f64.sqrt()).abs() < 1e-9);
-/// let modulus = StressStrainRegression::default().estimate(&uniaxial.series)?;
+/// let modulus = StressStrainRegression.estimate(&uniaxial.series)?;
 /// assert!((modulus.youngs_modulus_pa / 100e3 - 1.0).abs() < 1e-9);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -98,9 +98,8 @@ impl UniaxialLoads {
                 Quantity::ContactArea.positive(validated(face, Quantity::ContactArea)?.value)?;
             unloaded = unloaded.min(area);
         }
-        let regression = StressStrainRegression::default();
         for _ in 0..AREA_STEPS {
-            let line = regression.line(&StressStrainRegression::points(
+            let line = StressStrainRegression::line(&StressStrainRegression::points(
                 &law.strained(series, unloaded)?.0,
             )?)?;
             // The strain at which the line has zero stress is that of the unloaded face.
