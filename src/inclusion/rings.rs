@@ -24,6 +24,7 @@ const RINGS: usize = 60;
 /// # Ok::<(), tactile_imaging::inclusion::RingError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct RingMeans {
     /// Centre of the pressed region (x, y), in pixels.
     pub centre_px: [f64; 2],

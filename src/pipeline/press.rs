@@ -289,8 +289,9 @@ impl<'a> Press<'a> {
     /// `None` without contact, if the object is not a ball, or if the force or the layers of the
     /// guide are unknown.
     ///
-    /// The depths are those of [`depression_m`](crate::elasticity::contact::Waveguide::depression_m) for the
-    /// force and contact radius of the frame. The standard error includes force, radius, layers and
+    /// The depths are those of
+    /// [`depression_m`](crate::elasticity::contact::Waveguide::depression_m) for the force and
+    /// contact radius of the frame. The standard error includes force, radius, layers and
     /// the law, which assumes small strains.
     ///
     /// ```

@@ -144,6 +144,7 @@ impl fmt::Display for Skip {
 /// assert_eq!(work.to_string(), "1.250 ms in 4 runs");
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Work {
     /// Number of runs.
     pub runs: usize,

@@ -34,6 +34,7 @@ use std::fmt::{self, Display, Formatter};
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct ModulusResult {
     /// Young's modulus in pascals.
     pub value: f64,
@@ -83,6 +84,7 @@ impl From<&ModulusEstimate> for ModulusResult {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct FrameResult {
     /// Normal force in newtons.
     #[cfg_attr(feature = "serde", serde(serialize_with = "outcome::one"))]
@@ -128,6 +130,7 @@ pub struct FrameResult {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct MatchResult {
     /// Control points on the first surface.
     pub points: usize,
@@ -160,6 +163,7 @@ pub struct MatchResult {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct StrainResult {
     /// Name of the strain measure.
     pub measure: &'static str,
@@ -196,6 +200,7 @@ pub struct StrainResult {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct Measurement {
     /// Young's modulus by the pipeline's estimator.
     #[cfg_attr(feature = "serde", serde(serialize_with = "outcome::one"))]

@@ -37,6 +37,7 @@ use std::sync::Arc;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct Update {
     /// Number of the frame, counted from 0.
     pub frame: u64,
@@ -73,6 +74,7 @@ pub struct Update {
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct DriftWatch {
     /// Number of frames without contact so far.
     pub frames: u64,
@@ -550,6 +552,7 @@ impl Session {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct SessionStrain {
     /// The frame whose load is the origin of strain, from 0.
     pub from: u64,

@@ -32,6 +32,7 @@ const THREE_PER_LAYER: &str = "three rows and columns per layer (ln E, ln h, ν)
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SurfaceInput {
     /// The signal relative to its largest value, from 0 to 1: the cosine of the slope under frontal
     /// light.

@@ -26,6 +26,7 @@ use std::sync::Arc;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("stage `{stage}` must be {expected}, found \"{found}\"")]
+#[non_exhaustive]
 pub struct UnknownStage {
     /// The stage.
     pub stage: &'static str,

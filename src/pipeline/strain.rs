@@ -18,6 +18,7 @@ use crate::elasticity::modulus::Estimate;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct PairStrain {
     /// Name of the measure.
     pub measure: &'static str,

@@ -89,6 +89,7 @@ impl CheckPress {
             CheckedObject::Sample => "sample",
             CheckedObject::Calibrator => "calibrator",
             CheckedObject::Ball(_) => "ball",
+            _ => "other",
         };
         format!("CheckPress.{object}({} N)", self.known_n.value)
     }

@@ -42,7 +42,9 @@ fn every_equation_of_the_paper_has_its_file() {
 fn every_assumption_is_documented_with_its_default() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(root.join("tactile-files/src/scene/mod.rs")).unwrap();
-    let (_, table) = text.split_once("What is not stated is assumed").unwrap();
+    let (_, table) = text
+        .split_once("Errors that are not stated are assumed")
+        .unwrap();
     for assumption in Assumption::ALL {
         let default = match assumption.unit.starts_with("of ") {
             true => format!("{} %", (1000.0 * assumption.default).round() / 10.0),

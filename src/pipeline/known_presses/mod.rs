@@ -68,6 +68,7 @@ impl KnownBall {
 
 /// The object of a press of known force.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum CheckedObject {
     /// The measured object: its light coupling is checked too.
     Sample,
