@@ -583,7 +583,7 @@ fn strain_error<const D: usize>(
             add(row, direction * size.max(0.0).sqrt(), 1.0);
         }
         for axis in (0..D).filter(|&a| !known(a)) {
-            // A step of any size reveals the dependence on this derivative.
+            // The strain depends on this derivative if any step changes it.
             let direction = SVector::from_fn(|a, _| if a == axis { 1e-3 } else { 0.0 });
             add(row, direction, f64::INFINITY);
         }

@@ -4,7 +4,7 @@ use crate::error::ElasticityError;
 use crate::strain::{Deformation, PrincipalStretches, StrainMeasure, symmetric_eigen};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
-/// Step along an unknown derivative. A step of any size reveals which quantities depend on it.
+/// Step along an unknown derivative. Quantities that depend on it change with a step of any size.
 const UNKNOWN_STEP: f64 = 1e-3;
 
 /// Rotation, principal strains, volume change and equivalent strain at a point, with errors.

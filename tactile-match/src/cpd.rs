@@ -638,7 +638,7 @@ impl<const D: usize> Registration<D> {
 
     fn matching(&self, model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Matching<D> {
         let m_len = model.len();
-        // The posterior takes as long as an iteration, and its pairs longer: none if it was stopped.
+        // A stopped registration has no posterior, since that takes longer than an iteration.
         let (posterior, assignment) = if self.stop == StopReason::Cancelled {
             (vec![0.0; m_len * target.len()], vec![None; m_len])
         } else {

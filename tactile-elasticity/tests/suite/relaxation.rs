@@ -202,7 +202,7 @@ fn false_alarms_are_one_in_a_hundred() {
         let counts = counted(&times, |_| (0.7, 100e3), 0.0, seeds);
         let alarms = (seeds - counts[0]) as f64 / seeds as f64;
         println!("{count} loads: steady, relaxing, drifting, undecided {counts:?}");
-        // 1 %, and three standard deviations for this number of attempts.
+        // 1 % plus three standard deviations of the share among this many attempts.
         let allowed = 0.01 + 3.0 * (0.01 * 0.99 / seeds as f64).sqrt();
         assert!(alarms <= allowed, "{count} loads: {counts:?}");
     }

@@ -155,8 +155,8 @@ impl<T: PixelScalar> Field<T> {
             }
         }
         for height in &mut squares {
-            // Squares of depths above the plane. Without the shift, negative heights would have the
-            // squares of positive ones.
+            // Squares of depths above the plane. Without the shift, negative and positive heights
+            // would have equal squares.
             *height = (*height - plane).powi(2);
         }
         let mut field = Self {

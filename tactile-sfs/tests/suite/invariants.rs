@@ -115,8 +115,8 @@ fn a_turned_frame_has_turned_heights() {
             let plain = heights(p.view(), q.view(), [1.0, 1.5]);
             let turned = heights(q.t(), p.t(), [1.5, 1.0]);
             let differences = plain.iter().zip(turned.t()).map(|(a, b)| (a - b).abs());
-            // Heights of several tens. All solutions are direct, with the rounding of transforms of
-            // 64 points.
+            // The heights are several tens. All solutions are direct, with the rounding error of
+            // transforms of 64 points.
             let largest = differences.fold(0.0, f64::max);
             assert!(largest < 1e-10, "{name}, {rows} × {columns}: {largest:e}");
         }
