@@ -46,7 +46,7 @@ fn fast<const D: usize>(
     let mut workspace = SoftassignWorkspace::default();
     group.bench_function(BenchmarkId::new("softassign_with", name), |b| {
         b.iter(|| {
-            let go = |_, _| ControlFlow::Continue(());
+            let go = || ControlFlow::Continue(());
             let found = matcher
                 .match_points_with(&mut workspace, black_box(&scene.model), &scene.target, go)
                 .unwrap();

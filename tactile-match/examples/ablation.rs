@@ -107,7 +107,7 @@ impl<const D: usize> Scene<D> {
         workspace: &mut SoftassignWorkspace<D>,
     ) -> Result<Score, MatchError> {
         let start = Instant::now();
-        let go = |_, _| ControlFlow::Continue(());
+        let go = || ControlFlow::Continue(());
         let found = matcher.match_points_with(workspace, &self.model, &self.target, go)?;
         let seconds = start.elapsed().as_secs_f64();
         let n = self.model.len() as f64;

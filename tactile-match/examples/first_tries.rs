@@ -43,7 +43,7 @@ fn judge<const D: usize>(
 ) -> Result<(), MatchError> {
     let mut workspace = SoftassignWorkspace::default();
     let start = Instant::now();
-    let go = |_, _| ControlFlow::Continue(());
+    let go = || ControlFlow::Continue(());
     let matcher = AnnealedSoftassign::default();
     let found = matcher.match_points_with(&mut workspace, model, target, go)?;
     let seconds = start.elapsed().as_secs_f64();

@@ -69,12 +69,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let mut workspace = SoftassignWorkspace::default();
     let start = Instant::now();
-    let found = AnnealedSoftassign::default().match_points_with(
-        &mut workspace,
-        &model,
-        &target,
-        |_, _| ControlFlow::Continue(()),
-    )?;
+    let found =
+        AnnealedSoftassign::default().match_points_with(&mut workspace, &model, &target, || {
+            ControlFlow::Continue(())
+        })?;
     let searched = start.elapsed();
     let is_right = |(i, j): (usize, &Option<usize>)| j.and_then(|j| order.get(j)) == Some(&i);
     let right = found

@@ -102,14 +102,21 @@ fn solve<const D: usize>(
     let mut least = Duration::MAX;
     for _ in 0..5 {
         let start = Instant::now();
-        matcher.match_points_with(&mut workspace, &model, &target, |_, _| {
-            ControlFlow::Continue(())
-        })?;
+        matcher.match_points_with(
+            &mut workspace,
+            &model,
+            &target,
+            || ControlFlow::Continue(()),
+        )?;
         least = least.min(start.elapsed());
     }
-    let found = matcher.match_points_with(&mut workspace, &model, &target, |_, _| {
-        ControlFlow::Continue(())
-    })?;
+    let found =
+        matcher.match_points_with(
+            &mut workspace,
+            &model,
+            &target,
+            || ControlFlow::Continue(()),
+        )?;
     let warped: Vec<Point<f64, D>> = found.warped().collect();
     let milliseconds = 1e3 * least.as_secs_f64();
     // Writing to a string cannot fail.

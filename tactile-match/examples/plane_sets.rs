@@ -106,7 +106,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut workspace = SoftassignWorkspace::default();
     let start = Instant::now();
     let matcher = AnnealedSoftassign::default();
-    let go = |_, _| ControlFlow::Continue(());
+    let go = || ControlFlow::Continue(());
     let found = matcher.match_points_with(&mut workspace, &model, &target, go)?;
     let seconds = start.elapsed().as_secs_f64();
     let right = (0..model.len())

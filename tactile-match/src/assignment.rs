@@ -11,8 +11,9 @@
 //! chosen pairs. Unassigned rows and columns have price zero. To maximise, negate the costs. To
 //! forbid a pair, set its cost to `+∞`.
 
-use crate::MatchError;
 use crate::error::all_pairs;
+use crate::{MatchError, Watch};
+use std::ops::ControlFlow;
 
 /// Returns the column of each row of a cost matrix of shape `[rows, columns]` at the least total
 /// cost.
@@ -34,10 +35,20 @@ use crate::error::all_pairs;
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 pub fn linear_assignment(
-    [rows, columns]: [usize; 2],
+    sizes: [usize; 2],
     cost: impl FnMut(usize, usize) -> f64,
 ) -> Result<Vec<Option<usize>>, MatchError> {
-    let (search, _) = Search::solved([rows, columns], cost)?;
+    assigned(sizes, cost, &mut || ControlFlow::Continue(()))
+}
+
+/// Like [`linear_assignment`]. If `watch` returns `Break`, the rows that have no column yet get
+/// `None`.
+pub(crate) fn assigned(
+    [rows, columns]: [usize; 2],
+    cost: impl FnMut(usize, usize) -> f64,
+    watch: Watch<'_>,
+) -> Result<Vec<Option<usize>>, MatchError> {
+    let (search, _) = Search::solved([rows, columns], cost, watch)?;
     let column_of = match rows <= columns {
         true => search.column_of,
         false => search.row_of,
@@ -72,6 +83,7 @@ impl Search {
     fn solved(
         [rows, columns]: [usize; 2],
         mut cost: impl FnMut(usize, usize) -> f64,
+        watch: Watch<'_>,
     ) -> Result<(Self, Vec<f64>), MatchError> {
         all_pairs(rows, columns)?;
         let mut checked = |row, column| match cost(row, column) {
@@ -80,15 +92,23 @@ impl Search {
         };
         let [short, long] = [rows.min(columns), rows.max(columns)];
         let turned = rows > columns;
-        let pairs = (0..short).flat_map(|i| (0..long).map(move |j| (i, j)));
-        let costs = pairs.map(|(i, j)| if turned { checked(j, i) } else { checked(i, j) });
-        let costs: Vec<f64> = costs.collect::<Result<_, _>>()?;
+        let mut costs = Vec::with_capacity(short * long);
         let mut search = Self::default();
-        search.run(&costs, short, long);
+        search.start(short, long);
+        for i in 0..short {
+            if watch().is_break() {
+                return Ok((search, costs));
+            }
+            for j in 0..long {
+                costs.push(if turned { checked(j, i) } else { checked(i, j) }?);
+            }
+        }
+        // A search that stops early has fewer pairs.
+        let _ = search.run(&costs, long, watch);
         Ok((search, costs))
     }
 
-    fn run(&mut self, costs: &[f64], rows: usize, columns: usize) {
+    fn start(&mut self, rows: usize, columns: usize) {
         reset(&mut self.column_of, rows, NONE);
         reset(&mut self.row_of, columns, NONE);
         reset(&mut self.prices, columns, 0.0);
@@ -96,16 +116,18 @@ impl Search {
         reset(&mut self.before, columns, NONE);
         self.free.clear();
         self.free.extend(0..rows);
-        // Two passes, as published: rows that the first pass displaces often settle in the second.
-        self.reduce_rows(costs, columns);
-        self.reduce_rows(costs, columns);
         self.order.clear();
         self.order.extend(0..columns);
-        let free = std::mem::take(&mut self.free);
-        for &row in &free {
-            self.augment(costs, columns, row);
+    }
+
+    fn run(&mut self, costs: &[f64], columns: usize, watch: Watch<'_>) -> ControlFlow<()> {
+        // Two passes, as published: rows that the first pass displaces often settle in the second.
+        self.reduce_rows(costs, columns, watch)?;
+        self.reduce_rows(costs, columns, watch)?;
+        for row in std::mem::take(&mut self.free) {
+            self.augment(costs, columns, row, watch)?;
         }
-        self.free = free;
+        ControlFlow::Continue(())
     }
 
     /// Augmenting row reduction: each free row takes its cheapest column and raises the bid until
@@ -113,11 +135,12 @@ impl Search {
     ///
     /// Only columns that become assigned, and stay assigned, change their price. Unassigned columns
     /// keep `v = 0`, as the rectangular problem requires.
-    fn reduce_rows(&mut self, costs: &[f64], columns: usize) {
+    fn reduce_rows(&mut self, costs: &[f64], columns: usize, watch: Watch<'_>) -> ControlFlow<()> {
         self.waiting.clear();
         self.free.reverse();
         let mut bids = 8 * self.free.len(); // a price war of many steps is cheaper by augmentation
         while let Some(row) = self.free.pop() {
+            watch()?;
             let (mut best, second) = two_cheapest(&costs[row * columns..][..columns], &self.prices);
             let lowered = self.prices[best.0] - (second.1 - best.1);
             let lowers = lowered.is_finite() && lowered < self.prices[best.0];
@@ -147,25 +170,33 @@ impl Search {
             }
         }
         std::mem::swap(&mut self.free, &mut self.waiting);
+        ControlFlow::Continue(())
     }
 
     /// Follows the shortest augmenting path from a free row. The row stays free if only forbidden
     /// pairs lead on.
-    fn augment(&mut self, costs: &[f64], columns: usize, free_row: usize) {
+    fn augment(
+        &mut self,
+        costs: &[f64],
+        columns: usize,
+        free_row: usize,
+        watch: Watch<'_>,
+    ) -> ControlFlow<()> {
         for (j, &c) in costs[free_row * columns..][..columns].iter().enumerate() {
             self.distance[j] = c - self.prices[j];
             self.before[j] = free_row;
         }
         let mut open = columns;
         let (sink, reach) = loop {
+            watch()?;
             if open == 0 {
-                return;
+                return ControlFlow::Continue(());
             }
             let at = self.nearest(open);
             let column = self.order[at];
             let reach = self.distance[column];
             if !reach.is_finite() {
-                return;
+                return ControlFlow::Continue(());
             }
             open -= 1;
             self.order.swap(at, open);
@@ -178,6 +209,7 @@ impl Search {
             self.prices[column] += self.distance[column] - reach;
         }
         self.flip(sink, free_row);
+        ControlFlow::Continue(())
     }
 
     /// Position in the order of the open column with the shortest path. An unassigned column wins a

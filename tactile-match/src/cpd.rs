@@ -18,10 +18,11 @@
 //! kernel is factorised once, to its numerical rank, instead of solving an `M × M` system in every
 //! iteration.
 
+use crate::assignment::assigned;
 use crate::error::{all_pairs, at_least_one, option_within, point_sets};
 use crate::frame::{Frame, spread};
 use crate::gaussian_process::{Axes, Detail, Prior, PriorScales, Regression};
-use crate::{Judgement, MatchError, Matching, StopReason, linear_assignment};
+use crate::{Judgement, MatchError, Matching, StopReason, Watch};
 use nalgebra::{Point, SMatrix, SVector};
 use std::ops::ControlFlow;
 use tactile_core::vectorised;
@@ -280,7 +281,7 @@ impl<const D: usize> Registration<D> {
     }
 
     /// Alternates E-step and M-step until σ² converges or `watch` stops it.
-    fn run(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) {
+    fn run(&mut self, watch: Watch<'_>) {
         if self.sigma2 <= 0.0 {
             self.stop = StopReason::Exact; // all points of both sets coincide
             return;
@@ -438,7 +439,7 @@ impl<const D: usize> Posterior<D> {
         moved: &[Vec<f64>; D],
         target: &[[f64; D]],
         (sigma2, uniform): (f64, f64),
-        watch: &mut dyn FnMut() -> ControlFlow<()>,
+        watch: Watch<'_>,
     ) -> ControlFlow<()> {
         let vectors = [&mut self.model_mass, &mut self.column];
         for sums in self.weighted.0.iter_mut().chain(vectors) {
@@ -612,13 +613,13 @@ impl CoherentPointDrift {
         &self,
         model: &[Point<f64, D>],
         target: &[Point<f64, D>],
-        watch: &mut dyn FnMut() -> ControlFlow<()>,
+        watch: Watch<'_>,
     ) -> Result<Matching<D>, MatchError> {
         point_sets(model, target)?;
         all_pairs(model.len(), target.len())?;
         let mut registration = Registration::new(self, model, target);
         registration.run(watch);
-        Ok(registration.matching(model, target))
+        Ok(registration.matching(model, target, watch))
     }
 }
 
@@ -636,14 +637,19 @@ impl<const D: usize> Registration<D> {
         rows
     }
 
-    fn matching(&self, model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Matching<D> {
+    fn matching(
+        &self,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+        watch: Watch<'_>,
+    ) -> Matching<D> {
         let m_len = model.len();
         // A stopped registration has no posterior, since that takes longer than an iteration.
         let (posterior, assignment) = if self.stop == StopReason::Cancelled {
             (vec![0.0; m_len * target.len()], vec![None; m_len])
         } else {
             let posterior = self.posterior();
-            let assignment = pairs(&posterior, m_len, target.len());
+            let assignment = pairs(&posterior, m_len, target.len(), watch);
             (posterior, assignment)
         };
         let scale = self.frames[1].scale;
@@ -679,11 +685,16 @@ impl<const D: usize> Registration<D> {
 /// Assigns distinct targets to the model points so that the sum of the posterior is largest. A pair
 /// is kept only if its target is at least as likely to belong to the model point as to be an
 /// outlier.
-fn pairs(posterior: &[f64], model_len: usize, target_len: usize) -> Vec<Option<usize>> {
+fn pairs(
+    posterior: &[f64],
+    model_len: usize,
+    target_len: usize,
+    watch: Watch<'_>,
+) -> Vec<Option<usize>> {
     let mut assignment = vec![None; model_len];
     // The costs are probabilities, hence finite.
     let cost = |n: usize, m: usize| -posterior[n * model_len + m];
-    let columns = linear_assignment([target_len, model_len], cost).unwrap_or_default();
+    let columns = assigned([target_len, model_len], cost, watch).unwrap_or_default();
     for (n, m) in columns.iter().enumerate() {
         let Some(m) = *m else { continue };
         let row = &posterior[n * model_len..][..model_len];

@@ -1,10 +1,12 @@
 //! Pairing by distance alone: nearest neighbours and linear assignment.
 
+use crate::assignment::assigned;
 use crate::error::{point_sets, valid_distance};
 use crate::frame::{Frame, spread};
 use crate::interpolation::fitted;
-use crate::{Judgement, MatchError, Matching, PointMatcher, StopReason, linear_assignment};
+use crate::{Judgement, MatchError, Matching, PointMatcher, StopReason, Watch};
 use nalgebra::Point;
+use std::ops::ControlFlow;
 use tactile_tps::nearest_rows;
 
 /// Number of nearest targets considered as partners of a model point. If two unrelated sets have
@@ -179,7 +181,7 @@ pub(crate) fn nearest(distances: impl Iterator<Item = f64>) -> (usize, f64) {
     )
 }
 
-/// Pairs the sets so that the sum of squared distances is smallest, by [`linear_assignment`].
+/// Pairs the sets so that the sum of squared distances is smallest, by [`linear_assignment`](crate::linear_assignment).
 ///
 /// Unlike nearest neighbours, it pairs as many points as possible, and a common translation of two
 /// sets of equal size does not change the pairs. The warp is that of [`Matching::from_pairs`].
@@ -236,11 +238,20 @@ impl<const D: usize> PointMatcher<D> for LinearAssignment {
         model: &[Point<f64, D>],
         target: &[Point<f64, D>],
     ) -> Result<Matching<D>, MatchError> {
+        self.match_watched(model, target, &mut || ControlFlow::Continue(()))
+    }
+
+    fn match_watched(
+        &self,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+        watch: Watch<'_>,
+    ) -> Result<Matching<D>, MatchError> {
         point_sets(model, target)?;
         let sets = Sets::new(model, target);
         let limit = sets.limit(self.max_distance);
         let cost = |i, j| sets.squared(i, j).min(limit);
-        let mut assignment = linear_assignment([model.len(), target.len()], cost)?;
+        let mut assignment = assigned([model.len(), target.len()], cost, watch)?;
         for (i, partner) in assignment.iter_mut().enumerate() {
             *partner = partner.filter(|&j| sets.squared(i, j) <= limit);
         }

@@ -7,7 +7,7 @@
 use crate::softassign::SoftassignWorkspace;
 use crate::{
     AnnealedSoftassign, CoherentPointDrift, MatchError, MatchedPairs, Matching, PointMatcher,
-    RelaxationLabelling, WarmStart,
+    RelaxationLabelling, WarmStart, Watch,
 };
 use nalgebra::Point;
 use std::any::Any;
@@ -26,7 +26,6 @@ impl<F2: 'static, F3: 'static> Instances<F2, F3> {
 }
 
 type Found<const D: usize> = Result<Matching<D>, MatchError>;
-type Watch<'w> = &'w mut dyn FnMut() -> ControlFlow<()>;
 type Once<M, const D: usize> = fn(&M, &[Point<f64, D>], &[Point<f64, D>], Watch<'_>) -> Found<D>;
 type Next<const D: usize> =
     fn(&AnnealedSoftassign, &mut WarmStart, &[Point<f64, D>], &[Point<f64, D>]) -> Found<D>;
@@ -37,11 +36,7 @@ type NextPairs<const D: usize> = fn(
     &[Point<f64, D>],
     &mut MatchedPairs,
 ) -> Result<(), MatchError>;
-type Search<const D: usize> = fn(
-    &AnnealedSoftassign,
-    &mut SoftassignWorkspace<D>,
-    &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
-);
+type Search<const D: usize> = fn(&AnnealedSoftassign, &mut SoftassignWorkspace<D>, Watch<'_>);
 
 type Both<M> = Instances<Once<M, 2>, Once<M, 3>>;
 static SOFTASSIGN: Both<AnnealedSoftassign> =
@@ -64,9 +59,9 @@ impl AnnealedSoftassign {
     pub(crate) fn search_in<const D: usize>(
         &self,
         workspace: &mut SoftassignWorkspace<D>,
-        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+        watch: Watch<'_>,
     ) -> Result<(), MatchError> {
-        SEARCH.of::<Search<D>>(D)?(self, workspace, observe);
+        SEARCH.of::<Search<D>>(D)?(self, workspace, watch);
         Ok(())
     }
 }

@@ -69,3 +69,6 @@ pub use softassign::{
 };
 pub use tactile_core::{CustomError, StopReason};
 pub use transformation::FittedTransformation;
+
+/// Called many times a second by what takes long, which ends early if it returns `Break`.
+type Watch<'w> = &'w mut dyn FnMut() -> std::ops::ControlFlow<()>;

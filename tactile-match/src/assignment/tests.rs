@@ -4,6 +4,7 @@ use proptest::prelude::*;
 
 use super::{NONE, Search, linear_assignment};
 use crate::MatchError;
+use std::ops::ControlFlow;
 
 fn assigned(costs: &[f64], rows: usize, columns: usize) -> Result<Vec<Option<usize>>, MatchError> {
     linear_assignment([rows, columns], |i, j| costs[i * columns + j])
@@ -101,7 +102,7 @@ proptest! {
         let found = assigned(&costs, rows, columns).unwrap();
         assert_distinct(&found, columns);
         prop_assert_eq!(found.iter().flatten().count(), rows.min(columns));
-        let (search, costs) = Search::solved([rows, columns], |i, j| costs[i * columns + j]).unwrap();
+        let (search, costs) = Search::solved([rows, columns], |i, j| costs[i * columns + j], &mut || ControlFlow::Continue(())).unwrap();
         assert_optimal(&search, &costs);
     }
 

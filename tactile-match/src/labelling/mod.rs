@@ -34,10 +34,11 @@
 
 mod relaxation;
 
+use crate::assignment::assigned;
 use crate::error::{all_pairs, at_least_one, option_within, point_sets};
 use crate::frame::{Frame, spread};
 use crate::interpolation::spline;
-use crate::{Judgement, MatchError, Matching, StopReason, linear_assignment};
+use crate::{Judgement, MatchError, Matching, StopReason, Watch};
 use nalgebra::{Point, SVector};
 use relaxation::{MatchMatrix, NeighbourGraph, energy, relax};
 use std::ops::ControlFlow;
@@ -368,7 +369,7 @@ impl RelaxationLabelling {
         &self,
         model: &[Point<f64, D>],
         target: &[Point<f64, D>],
-        watch: &mut dyn FnMut() -> ControlFlow<()>,
+        watch: Watch<'_>,
     ) -> Result<Matching<D>, MatchError> {
         point_sets(model, target)?;
         all_pairs(model.len(), target.len())?;
@@ -401,7 +402,7 @@ impl RelaxationLabelling {
                 break;
             }
         }
-        Ok(run.finish(model, target))
+        Ok(run.finish(model, target, watch))
     }
 }
 
@@ -418,11 +419,7 @@ struct Run<const D: usize> {
 
 impl<const D: usize> Run<D> {
     /// Computes the match matrix of the current sets and its energy (14).
-    fn relax(
-        &mut self,
-        options: &RelaxationLabelling,
-        watch: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
+    fn relax(&mut self, options: &RelaxationLabelling, watch: Watch<'_>) -> ControlFlow<()> {
         self.matches = relax(options, &self.warped, &self.target, watch)?;
         let graph = |points: &Vec<_>| NeighbourGraph::new(points, options.neighbourhood);
         let [x, y] = [&self.warped, &self.target].map(graph);
@@ -472,12 +469,12 @@ impl<const D: usize> Run<D> {
     }
 
     /// Distinct partners with the largest sum of probabilities. `None` if the slack is likelier.
-    fn assignment(&self) -> Vec<Option<usize>> {
+    fn assignment(&self, watch: Watch<'_>) -> Vec<Option<usize>> {
         let (rows, columns) = (self.model.len(), self.target.len());
         // The costs are probabilities, hence finite.
         let cost = |i, j| -self.matches[(i, j)];
         let mut assignment =
-            linear_assignment([rows, columns], cost).unwrap_or_else(|_| vec![None; rows]);
+            assigned([rows, columns], cost, watch).unwrap_or_else(|_| vec![None; rows]);
         for (i, partner) in assignment.iter_mut().enumerate() {
             let slack = self.matches[(i, columns)];
             *partner =
@@ -487,8 +484,13 @@ impl<const D: usize> Run<D> {
     }
 
     /// The result, in the units of the caller.
-    fn finish(self, model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Matching<D> {
-        let assignment = self.assignment();
+    fn finish(
+        self,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+        watch: Watch<'_>,
+    ) -> Matching<D> {
+        let assignment = self.assignment(watch);
         let positions: Vec<Point<f64, D>> = self
             .warped
             .iter()

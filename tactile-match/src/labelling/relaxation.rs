@@ -1,7 +1,7 @@
 //! Relaxation (13)–(20): graphs, compatibilities, support, update and normalisation.
 
 use super::{Compatibility, LengthMaximum, Neighbourhood, RelaxationLabelling};
-use crate::ShapeContexts;
+use crate::{ShapeContexts, Watch};
 use nalgebra::{Point, SVector};
 use std::ops::ControlFlow;
 
@@ -288,7 +288,7 @@ pub(super) fn energy<const D: usize>(
     m: &MatchMatrix,
     model: &NeighbourGraph<D>,
     target: &NeighbourGraph<D>,
-    watch: &mut dyn FnMut() -> ControlFlow<()>,
+    watch: Watch<'_>,
 ) -> ControlFlow<(), f64> {
     assert_eq!(
         (m.rows, m.columns),
@@ -436,7 +436,7 @@ pub(super) fn relax<const D: usize>(
     options: &RelaxationLabelling,
     model: &[Point<f64, D>],
     target: &[Point<f64, D>],
-    watch: &mut dyn FnMut() -> ControlFlow<()>,
+    watch: Watch<'_>,
 ) -> ControlFlow<(), MatchMatrix> {
     let graphs = [model, target].map(|points| NeighbourGraph::new(points, options.neighbourhood));
     let longest = match options.length_maximum {
@@ -518,7 +518,7 @@ impl<'a, const D: usize> Links<'a, D> {
         m: &MatchMatrix,
         graphs: &'a [NeighbourGraph<D>; 2],
         rule: CompatibilityRule,
-        watch: &mut dyn FnMut() -> ControlFlow<()>,
+        watch: Watch<'_>,
     ) -> ControlFlow<(), Self> {
         assert_eq!(
             (m.rows, m.columns),
@@ -544,7 +544,7 @@ impl<'a, const D: usize> Links<'a, D> {
         ControlFlow::Continue(links)
     }
 
-    fn store(&mut self, watch: &mut dyn FnMut() -> ControlFlow<()>) -> ControlFlow<()> {
+    fn store(&mut self, watch: Watch<'_>) -> ControlFlow<()> {
         let (mut starts, mut stored) = (vec![0], Vec::new());
         let width = self.graphs[1].points() + 1;
         for i in 0..self.candidates.len() {
@@ -577,11 +577,7 @@ impl<'a, const D: usize> Links<'a, D> {
     /// `S_ij = Σ_{a∈N(i)} Σ_{b∈N(j)} M_ab r(ia, jb)`.
     ///
     /// A point whose match is settled to rounding keeps the support of that pair alone.
-    fn support(
-        &self,
-        m: &MatchMatrix,
-        watch: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> ControlFlow<(), Vec<f64>> {
+    fn support(&self, m: &MatchMatrix, watch: Watch<'_>) -> ControlFlow<(), Vec<f64>> {
         let mut support = vec![0.0; m.rows * m.columns];
         let mut pair = 0;
         for (i, candidates) in self.candidates.iter().enumerate() {

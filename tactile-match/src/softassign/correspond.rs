@@ -2,8 +2,10 @@
 //! labelling decides.
 
 use super::{difference, dot, squared, squared_distance};
+use crate::Watch;
 use crate::shape_context::ShapeContexts;
 use std::f64::consts::PI;
+use std::ops::ControlFlow;
 
 /// Radius of the shape contexts, in radii of the model.
 const RADIUS: f64 = 2.0;
@@ -26,9 +28,14 @@ pub(super) struct Correspondence {
 
 impl Correspondence {
     /// Finds `pairs` for model points in place.
-    pub(super) fn find<const D: usize>(&mut self, model: &[[f64; D]], target: &[[f64; D]]) {
-        self.propose(model, target);
-        self.relax(model, target);
+    pub(super) fn find<const D: usize>(
+        &mut self,
+        model: &[[f64; D]],
+        target: &[[f64; D]],
+        watch: Watch<'_>,
+    ) -> ControlFlow<()> {
+        self.propose(model, target, watch)?;
+        self.relax(model, target, watch)?;
         let likeliest = |i| {
             self.labels.row(i).fold(
                 (0, 0.0),
@@ -37,14 +44,21 @@ impl Correspondence {
         };
         self.pairs.clear();
         self.pairs.extend((0..model.len()).map(likeliest));
+        ControlFlow::Continue(())
     }
 
     /// Selects the candidates with the lowest shape-context cost, with first probabilities.
-    fn propose<const D: usize>(&mut self, model: &[[f64; D]], target: &[[f64; D]]) {
+    fn propose<const D: usize>(
+        &mut self,
+        model: &[[f64; D]],
+        target: &[[f64; D]],
+        watch: Watch<'_>,
+    ) -> ControlFlow<()> {
         self.model_contexts.build(model, RADIUS);
         self.target_contexts.build(target, RADIUS);
         self.labels.reset(target.len(), SLACK);
         for i in 0..model.len() {
+            watch()?;
             self.model_contexts
                 .costs_into(i, &self.target_contexts, &mut self.costs);
             let costs = &self.costs;
@@ -72,11 +86,17 @@ impl Correspondence {
                 SLACK,
             );
         }
+        ControlFlow::Continue(())
     }
 
     /// Relaxation with the paper's compatibilities over nearest neighbours.
-    fn relax<const D: usize>(&mut self, model: &[[f64; D]], target: &[[f64; D]]) {
-        let kept = self.find_neighbours(model);
+    fn relax<const D: usize>(
+        &mut self,
+        model: &[[f64; D]],
+        target: &[[f64; D]],
+        watch: Watch<'_>,
+    ) -> ControlFlow<()> {
+        let kept = self.find_neighbours(model, watch)?;
         let (neighbours, reach) = (&self.neighbours, &self.reach);
         let near = |i: usize| &neighbours[i * kept..(i + 1) * kept];
         let weight = |(i, j): (usize, usize), (a, b): (usize, usize)| {
@@ -92,21 +112,28 @@ impl Correspondence {
         };
         self.labels.link(weight, near);
         for _ in 0..12 {
+            watch()?;
             self.labels.sweep(0.05, 2);
             if self.labels.is_settled(0.999) {
                 break;
             }
         }
+        ControlFlow::Continue(())
     }
 
     /// Lists the nearest neighbours of each model point. Returns the number of neighbours per
     /// point.
-    fn find_neighbours<const D: usize>(&mut self, model: &[[f64; D]]) -> usize {
+    fn find_neighbours<const D: usize>(
+        &mut self,
+        model: &[[f64; D]],
+        watch: Watch<'_>,
+    ) -> ControlFlow<(), usize> {
         // Neighbours per model point.
         let kept = 8.min(model.len() - 1);
         self.neighbours.clear();
         self.reach.clear();
         for (i, x) in model.iter().enumerate() {
+            watch()?;
             self.order.clear();
             self.order.extend((0..model.len()).filter(|&a| a != i));
             let distance = |a: usize| squared_distance(&model[a], x).sqrt();
@@ -124,7 +151,7 @@ impl Correspondence {
             );
             self.neighbours.extend_from_slice(&self.order);
         }
-        kept
+        ControlFlow::Continue(kept)
     }
 }
 

@@ -6,6 +6,7 @@ use super::search::{FAST, MAX_PATTERN_REACH, SCALES, warmth};
 use super::{
     AnnealedSoftassign, Mechanism, Rotation, SoftassignWorkspace, squared_distance, starts,
 };
+use crate::Watch;
 use crate::gaussian_process::{Axes, Prior};
 use std::ops::ControlFlow;
 
@@ -40,7 +41,7 @@ impl AnnealedSoftassign {
     pub(super) fn solve_coarse_to_fine<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
-        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+        watch: Watch<'_>,
     ) -> ControlFlow<()> {
         let smaller = ws.model.len().min(ws.target.len());
         let mut stride = 1;
@@ -56,7 +57,7 @@ impl AnnealedSoftassign {
             levels.base.clone_from(&ws.model);
             self.enter(ws, &mut levels, 1);
             std::mem::swap(&mut ws.levels, &mut levels);
-            let follows = self.place_by_motions(ws);
+            let follows = or_stop(self.place_by_motions(ws, watch), &mut flow);
             std::mem::swap(&mut ws.levels, &mut levels);
             if follows {
                 let run = self.schedule(Cooling {
@@ -65,7 +66,7 @@ impl AnnealedSoftassign {
                     still: STILL,
                     ..FAST
                 });
-                flow = refine(ws, run, flow, observe);
+                flow = refine(ws, run, flow, watch);
                 ws.state.tail = ws.annealer.tail(0.1 * ws.spacing);
                 ws.best.copy_from(&ws.state);
                 ws.annealer
@@ -76,7 +77,7 @@ impl AnnealedSoftassign {
             }
         }
         if stride > 0 {
-            flow = self.coarsest(ws, &mut levels, stride, observe);
+            flow = self.coarsest(ws, &mut levels, stride, watch);
         }
         while stride > 1 {
             // First temperature of a level, in spacings of the coarser level.
@@ -88,7 +89,11 @@ impl AnnealedSoftassign {
             let run = if stride > 1 {
                 self.sampled(ws, sigma)
             } else if self.has(Mechanism::LargePatterns)
-                && self.follow_sampled_patterns(ws, &mut levels)
+                && flow.is_continue()
+                && or_stop(
+                    self.follow_sampled_patterns(ws, &mut levels, watch),
+                    &mut flow,
+                )
             {
                 self.schedule(Cooling {
                     // First temperature after the block patterns, in spacings.
@@ -105,7 +110,7 @@ impl AnnealedSoftassign {
                     ..FAST
                 })
             };
-            flow = refine(ws, run, flow, observe);
+            flow = refine(ws, run, flow, watch);
         }
         // A run below the noise temperature has lost pairs: repeat it with the temperature set by
         // the residuals.
@@ -118,7 +123,7 @@ impl AnnealedSoftassign {
                 still: STILL,
                 ..FAST
             });
-            flow = refine(ws, run, flow, observe);
+            flow = refine(ws, run, flow, watch);
         }
         let schedule = self.schedule(FAST);
         let noisy = ws.state.sigma > ws.annealer.clean_sigma;
@@ -137,10 +142,8 @@ impl AnnealedSoftassign {
                 .evaluate(&mut ws.state, self.share, ws.annealer.resolution);
             ws.best.copy_from(&ws.state);
         }
-        if flow.is_continue() {
-            self.look_for_rivals(ws);
-        }
-        flow
+        flow?;
+        self.look_for_rivals(ws, watch)
     }
 
     /// Moves `ws.state` onto the field on which the local patterns agree: first the patterns of a
@@ -150,20 +153,21 @@ impl AnnealedSoftassign {
         &self,
         ws: &mut SoftassignWorkspace<D>,
         levels: &mut Levels<D>,
-    ) -> bool {
+        watch: Watch<'_>,
+    ) -> ControlFlow<(), bool> {
         let mut reach = 8.0 * ws.spacing;
         // First stage: number of points whose local patterns are compared, and the distance of
         // their candidates. The distance is in spacings and grows by this factor while the patterns
         // do not agree on a field; its limit is in radii of the model.
-        while !follow_patterns_of(ws, levels, 120, reach.min(MAX_PATTERN_REACH)) {
+        while !follow_patterns_of(ws, levels, 120, reach.min(MAX_PATTERN_REACH), watch)? {
             if reach >= MAX_PATTERN_REACH {
-                return false;
+                return ControlFlow::Continue(false);
             }
             reach *= 2.5;
         }
         // Second stage: number of points and reach, in spacings, of the patterns that refine this
         // field.
-        follow_patterns_of(ws, levels, 1000, 4.0 * ws.spacing)
+        follow_patterns_of(ws, levels, 1000, 4.0 * ws.spacing, watch)
     }
 
     /// Sets targets, prior and spacing of a level.
@@ -187,7 +191,7 @@ impl AnnealedSoftassign {
         ws: &mut SoftassignWorkspace<D>,
         levels: &mut Levels<D>,
         stride: usize,
-        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+        watch: Watch<'_>,
     ) -> ControlFlow<()> {
         let mut base = Vec::new();
         let rotations = starts::rotations::<D>(self.rotation).map(Some);
@@ -200,7 +204,7 @@ impl AnnealedSoftassign {
             self.enter(ws, levels, stride);
             ws.state.warped.clone_from(&ws.state.base);
             let run = self.sampled(ws, FAST.sigma);
-            refine(ws, run, ControlFlow::Continue(()), observe)?;
+            refine(ws, run, ControlFlow::Continue(()), watch)?;
             if self.rotation == Rotation::Limited {
                 return ControlFlow::Continue(());
             }
@@ -228,13 +232,13 @@ impl AnnealedSoftassign {
     }
 }
 
-/// One annealing run of a level. If the caller has stopped the search, a single iteration without
-/// observer.
+/// One annealing run of a level. If the caller has stopped the search, a single iteration that is not
+/// watched.
 fn refine<const D: usize>(
     ws: &mut SoftassignWorkspace<D>,
     schedule: Schedule,
     flow: ControlFlow<()>,
-    observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+    watch: Watch<'_>,
 ) -> ControlFlow<()> {
     ws.state.trace.clear();
     ws.state.iterations = 0;
@@ -242,14 +246,14 @@ fn refine<const D: usize>(
     // the temperature.
     ws.annealer.soft.faintest = 1e-4;
     if flow.is_continue() {
-        return ws.annealer.run(&mut ws.state, &schedule, observe);
+        return ws.annealer.run(&mut ws.state, &schedule, watch);
     }
     let once = Schedule {
         limit: 1,
         ..schedule
     };
-    let silent = &mut |_, _| ControlFlow::Continue(());
-    // The silent observer cannot stop the run.
+    let silent = &mut || ControlFlow::Continue(());
+    // The silent watch cannot stop the run.
     let _ = ws.annealer.run(&mut ws.state, &once, silent);
     flow
 }
@@ -261,13 +265,17 @@ fn follow_patterns_of<const D: usize>(
     levels: &mut Levels<D>,
     points: usize,
     reach: f64,
-) -> bool {
+    watch: Watch<'_>,
+) -> ControlFlow<(), bool> {
     let step = (ws.model.len() / points).max(1);
     let order = &levels.model_order.order;
     let rows = order.iter().step_by(step).copied();
     let (warped, target) = (&ws.state.warped, &*ws.target);
-    if !ws.patterns.propose(rows.clone(), warped, target, reach) {
-        return false;
+    if !ws
+        .patterns
+        .propose(rows.clone(), warped, target, reach, watch)?
+    {
+        return ControlFlow::Continue(false);
     }
     levels.model.clear();
     levels.model.extend(rows.clone().map(|i| ws.model[i]));
@@ -288,7 +296,18 @@ fn follow_patterns_of<const D: usize>(
     if agreed {
         levels.extend(&mut ws.annealer, 1, step, &mut ws.state);
     }
-    agreed
+    ControlFlow::Continue(agreed)
+}
+
+/// Whether a start was found. Notes in `flow` that the caller has stopped the search.
+fn or_stop(found: ControlFlow<(), bool>, flow: &mut ControlFlow<()>) -> bool {
+    match found {
+        ControlFlow::Continue(found) => found,
+        ControlFlow::Break(()) => {
+            *flow = ControlFlow::Break(());
+            false
+        }
+    }
 }
 
 /// Fraction of the pairs whose targets lie within `distance` of the model points' positions.

@@ -84,7 +84,7 @@ use std::ops::ControlFlow;
 ///     // a sequence of frames: memory is taken once
 ///     let target = model.map(|p| Point2::new(p.x + load * p.y, p.y));
 ///     let matcher = AnnealedSoftassign::default();
-///     let found = matcher.match_points_with(&mut workspace, &model, &target, |_, _| {
+///     let found = matcher.match_points_with(&mut workspace, &model, &target, || {
 ///         ControlFlow::Continue(())
 ///     })?;
 ///     assert!((0..6).all(|i| found.assignment[i] == Some(i)));
@@ -186,8 +186,8 @@ impl AnnealedSoftassign {
     /// Like [`match_points`](crate::PointMatcher::match_points), in the caller's workspace. It
     /// allocates nothing once the workspace has grown.
     ///
-    /// `observe` is called with the iteration and the energy after each outer iteration and may
-    /// stop the search: the best answer so far is then returned.
+    /// `watch` is called many times a second and may stop the search: the best answer so far is then
+    /// returned.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -212,7 +212,7 @@ impl AnnealedSoftassign {
     ///     &mut workspace,
     ///     &model,
     ///     &target,
-    ///     |_, _| ControlFlow::Continue(()),
+    ///     || ControlFlow::Continue(()),
     /// )?;
     /// assert_eq!(found.assignment[3], Some(26));
     /// # Ok(())
@@ -226,10 +226,10 @@ impl AnnealedSoftassign {
         workspace: &'w mut SoftassignWorkspace<D>,
         model: &[Point<f64, D>],
         target: &[Point<f64, D>],
-        mut observe: impl FnMut(usize, f64) -> ControlFlow<()>,
+        mut watch: impl FnMut() -> ControlFlow<()>,
     ) -> Result<SoftassignMatch<'w, D>, MatchError> {
         workspace.take(model, target)?;
-        self.search_in(workspace, &mut observe)?;
+        self.search_in(workspace, &mut watch)?;
         Ok(SoftassignMatch::of(workspace))
     }
 }
@@ -244,7 +244,7 @@ impl AnnealedSoftassign {
         watch: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Matching<D>, MatchError> {
         let mut workspace = SoftassignWorkspace::default();
-        let found = self.match_points_with(&mut workspace, model, target, |_, _| watch())?;
+        let found = self.match_points_with(&mut workspace, model, target, watch)?;
         Ok(found.to_matching(model))
     }
 

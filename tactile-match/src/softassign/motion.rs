@@ -3,8 +3,10 @@
 
 use super::patterns::Cells;
 use super::{difference, squared_distance};
+use crate::Watch;
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::PI;
+use std::ops::ControlFlow;
 use tactile_core::statistics::quantile;
 
 // Among all differences `tⱼ − xᵢ` between a block of neighbours and the targets, those of correct
@@ -139,11 +141,13 @@ impl<const D: usize> Motions<D> {
         order: &[usize],
         spacing: f64,
         farthest: f64,
-    ) -> bool {
+        watch: Watch<'_>,
+    ) -> ControlFlow<(), bool> {
+        const NONE: ControlFlow<(), bool> = ControlFlow::Continue(false);
         self.seeds.clear();
         let smaller = still.len().min(target.len());
         if smaller < FEWEST || !(spacing > 0.0 && spacing.is_finite()) {
-            return false;
+            return NONE;
         }
         let most = FAR_SPACINGS[usize::from(D > 2)] * spacing;
         let far = FAR.min(most).min(farthest).max(1.5 * spacing);
@@ -161,11 +165,11 @@ impl<const D: usize> Motions<D> {
             let peak = self.peak(still, target, &here, far, spacing);
             let Some((motion, _)) = peak.filter(|(_, peak)| peak.pairs >= COMMON * smaller as f64)
             else {
-                return false;
+                return NONE;
             };
             self.seeds.push(seed(0));
             self.seeds[0].motion = Some(motion);
-            return true;
+            return ControlFlow::Continue(true);
         }
         self.wanted = BLOCK.min(still.len() / BLOCKS);
         self.radius = spacing * (self.wanted as f64 / PI).powf(1.0 / D as f64);
@@ -176,12 +180,13 @@ impl<const D: usize> Motions<D> {
             for seed in &mut self.seeds {
                 seed.motion = Some(Local::still(&still[seed.row]));
             }
-            return true;
+            return ControlFlow::Continue(true);
         }
         self.model.build(still, 1.5 * spacing);
         let step = (self.seeds.len() / PROBES).max(1);
         let mut best = (FAR_HEIGHT, None);
         for k in (0..self.seeds.len()).step_by(step) {
+            watch()?;
             let row = self.seeds[k].row;
             self.gather(still, row);
             let here = Local::still(&still[row]);
@@ -191,10 +196,11 @@ impl<const D: usize> Motions<D> {
             }
         }
         let Some((k, motion)) = best.1 else {
-            return false;
+            return NONE;
         };
         self.settle(still, k, motion);
         while let Some(k) = self.next() {
+            watch()?;
             let row = self.seeds[k].row;
             self.gather(still, row);
             let here = self.predict(still, row);
@@ -206,7 +212,7 @@ impl<const D: usize> Motions<D> {
         }
         let total = self.seeds.len();
         self.seeds.retain(|seed| seed.motion.is_some());
-        self.seeds.len() as f64 >= AGREEING * total as f64
+        ControlFlow::Continue(self.seeds.len() as f64 >= AGREEING * total as f64)
     }
 
     /// Distance to their nearest targets that four in five of the moved points do not exceed, up to

@@ -417,7 +417,7 @@ impl AnnealedSoftassign {
         &self,
         pairs: &[Pair<'_, D>],
     ) -> Vec<Result<Matching<D>, MatchError>> {
-        let go = |_, _| ControlFlow::Continue(());
+        let go = || ControlFlow::Continue(());
         let one = |workspace: &mut _, &(model, target): &_| {
             Ok(self
                 .match_points_with(workspace, model, target, go)?

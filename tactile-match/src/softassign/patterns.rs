@@ -3,9 +3,11 @@
 
 use super::run::{Annealer, State};
 use super::{difference, squared_distance};
+use crate::Watch;
 use crate::gaussian_process::{Axes, Prior, PriorScales};
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::TAU;
+use std::ops::ControlFlow;
 
 /// Working memory of the start.
 #[derive(Clone, Debug, Default)]
@@ -56,10 +58,11 @@ impl<const D: usize> LocalPatterns<D> {
         warped: &[[f64; D]],
         target: &[[f64; D]],
         reach: f64,
-    ) -> bool {
+        watch: Watch<'_>,
+    ) -> ControlFlow<(), bool> {
         self.spacing = self.typical_spacing(target);
         if !(self.spacing > 0.0 && self.spacing < reach) {
-            return false;
+            return ControlFlow::Continue(false);
         }
         // Side of the cells for the search of candidates, in spacings.
         self.targets.build(target, 2.0 * self.spacing);
@@ -67,12 +70,13 @@ impl<const D: usize> LocalPatterns<D> {
         self.model.build(warped, 2.0 * self.spacing);
         self.best.clear();
         for i in rows {
+            watch()?;
             self.look_around(warped, i);
             let best = self.best_candidate(warped, target, i, reach);
             self.best.push(best);
         }
         self.weigh();
-        true
+        ControlFlow::Continue(true)
     }
 
     /// Median nearest-neighbour distance of the targets, over a sample.

@@ -4,7 +4,7 @@ use super::run::{Cooling, State};
 use super::search::{FAST, bounding_volume};
 use super::{AnnealedSoftassign, Mechanism, Rotation, SoftassignWorkspace};
 use super::{difference, mean, squared, squared_distance, starts};
-use crate::Doubt;
+use crate::{Doubt, Watch};
 use nalgebra::{SMatrix, SVector};
 use std::ops::ControlFlow;
 
@@ -75,27 +75,37 @@ impl AnnealedSoftassign {
     /// Searches for a better answer among the rotated, mirrored and shifted models. An allowed
     /// rival replaces the answer. Others that are better or equally good are stored in `ws.twin`
     /// and `ws.repeats`.
-    pub(super) fn look_for_rivals<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
+    pub(super) fn look_for_rivals<const D: usize>(
+        &self,
+        ws: &mut SoftassignWorkspace<D>,
+        watch: Watch<'_>,
+    ) -> ControlFlow<()> {
         let few = ws.model.len().min(ws.target.len()) < 4 * D;
         if few || ws.best.trace.is_empty() || !self.has(Mechanism::Rivals) {
-            return; // any few points have many nearly equal partners
+            return ControlFlow::Continue(()); // any few points have many nearly equal partners
         }
         let spacing = ws.mean_spacing();
         ws.put_where_looked_up(spacing);
         if ws.best.sigma >= RESOLVED * spacing {
-            self.look_for_turns(ws, spacing);
+            self.look_for_turns(ws, spacing, watch)?;
         }
         if ws.twin.is_none() {
-            self.look_for_steps(ws, spacing);
+            self.look_for_steps(ws, spacing, watch)?;
         }
+        ControlFlow::Continue(())
     }
 
     /// Searches for a better answer among the rotated and mirrored models.
-    fn look_for_turns<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>, spacing: f64) {
+    fn look_for_turns<const D: usize>(
+        &self,
+        ws: &mut SoftassignWorkspace<D>,
+        spacing: f64,
+        watch: Watch<'_>,
+    ) -> ControlFlow<()> {
         let still = Moved::by_turn(SMatrix::identity());
         let own = ws.distance_after(&still, &ws.linear_part(), spacing, NEAR);
         let Some(own) = own.filter(|&own| own > RESOLVED * spacing) else {
-            return;
+            return ControlFlow::Continue(());
         };
         for (mirrored, reflection) in [(false, SMatrix::identity()), (true, mirror())] {
             let linear = ws.linear_part(); // of the answer, which a rotated model may have replaced
@@ -112,7 +122,7 @@ impl AnnealedSoftassign {
             let Some(moved) = best.1 else { continue };
             ws.start_from(&moved, &linear);
             // At a higher temperature points would leave their first partners.
-            let gain = self.run_rival(ws, 0.3 * spacing, &moved);
+            let gain = self.run_rival(ws, 0.3 * spacing, &moved, watch)?;
             let points = ws.model.len() as f64;
             let chance = if allowed {
                 CLEAR_GAIN[1] * points
@@ -131,18 +141,24 @@ impl AnnealedSoftassign {
                 };
             }
         }
+        ControlFlow::Continue(())
     }
 
     /// Searches for lattice steps: the answer of least motion replaces one that fits the targets no
     /// better. Stores in `ws.repeats` a step that fits equally well and is within reach.
-    fn look_for_steps<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>, spacing: f64) {
+    fn look_for_steps<const D: usize>(
+        &self,
+        ws: &mut SoftassignWorkspace<D>,
+        spacing: f64,
+        watch: Watch<'_>,
+    ) -> ControlFlow<()> {
         ws.find_steps(spacing);
         // Each round shifts the answer by one step towards the unmoved model.
         for _ in 0..4 {
             let linear = ws.linear_part();
             let still = Moved::by_turn(SMatrix::identity());
             let Some(own) = ws.distance_after(&still, &linear, spacing, NEAR_STEP) else {
-                return;
+                break;
             };
             let most = AS_NEAR * own + ROUNDING * spacing;
             let mut least: Option<(f64, Moved<D>)> = None;
@@ -158,11 +174,11 @@ impl AnnealedSoftassign {
                     least = Some((motion, moved));
                 }
             }
-            let Some((motion, moved)) = least else { return };
+            let Some((motion, moved)) = least else { break };
             let own = ws.motion_after(&SVector::zeros());
             if motion < own {
                 ws.start_from(&moved, &linear);
-                let gain = self.run_rival(ws, 0.2 * spacing, &moved);
+                let gain = self.run_rival(ws, 0.2 * spacing, &moved, watch)?;
                 // The edges of a view cost each answer some points.
                 if gain > -CLEAR_GAIN[0] && !ws.state.far {
                     self.accept(ws);
@@ -175,8 +191,9 @@ impl AnnealedSoftassign {
                 (0..D).for_each(|k| outward[k] = step[k] * ws.frame.scale);
                 ws.repeats = Some(Doubt::Repeats { step: outward });
             }
-            return;
+            break;
         }
+        ControlFlow::Continue(())
     }
 
     /// Runs from `ws.state`. Returns its gain over the answer.
@@ -185,16 +202,15 @@ impl AnnealedSoftassign {
         ws: &mut SoftassignWorkspace<D>,
         sigma: f64,
         moved: &Moved<D>,
-    ) -> f64 {
+        watch: Watch<'_>,
+    ) -> ControlFlow<(), f64> {
         if ws.annealer.rigid.is_active() {
             let turned = |p: &[f64; D]| <[f64; D]>::from(moved.apply(p));
             ws.state.base.clear();
             ws.state.base.extend(ws.model.iter().map(turned));
             ws.annealer.rigid.set(self.transformation, &ws.state.base);
         }
-        // The silent observer cannot stop the run.
-        let silent = &mut |_, _| ControlFlow::Continue(());
-        let _ = self.anneal_only(ws, Cooling { sigma, ..FOLLOW }, silent);
+        let flow = self.anneal_only(ws, Cooling { sigma, ..FOLLOW }, watch);
         ws.state.tail = ws.annealer.tail(0.1 * ws.spacing);
         ws.state.far = ws.is_far(&ws.state);
         let energy = ws.best.energy;
@@ -210,7 +226,8 @@ impl AnnealedSoftassign {
         let gain = ws.best.energy - ws.state.energy;
         ws.best.energy = energy;
         ws.annealer.rigid.set(self.transformation, &ws.model);
-        gain
+        flow?;
+        ControlFlow::Continue(gain)
     }
 
     /// Accepts the last run as the answer.

@@ -4,6 +4,7 @@ use super::assign::{Gaussian, SoftAssignment};
 use super::difference;
 use super::options::Slack;
 use super::rigid::RigidFit;
+use crate::Watch;
 use crate::gaussian_process::{Axes, Prior, Regression, Request};
 use crate::judgement::median_of_chi_squared;
 use std::f64::consts::TAU;
@@ -176,13 +177,13 @@ impl<const D: usize> Annealer<D> {
         slack.model.max(slack.target) * weight
     }
 
-    /// Alternates until the temperature no longer falls. `observe` is called after each iteration
+    /// Alternates until the temperature no longer falls. `watch` is called after each iteration
     /// and may stop the run.
     pub(super) fn run(
         &mut self,
         state: &mut State<D>,
         schedule: &Schedule,
-        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+        watch: Watch<'_>,
     ) -> ControlFlow<()> {
         let mut variance = schedule.cooling.sigma * schedule.cooling.sigma;
         let (mut standing, mut noise_found) = (0, false);
@@ -195,7 +196,7 @@ impl<const D: usize> Annealer<D> {
             }
             state.iterations += 1;
             state.trace.push(self.free_energy(state, variance));
-            observe(state.iterations, *state.trace.last().unwrap_or(&0.0))?;
+            watch()?;
             let floor = self.floor(schedule).powi(2);
             // Temperatures (variances) below this are cold: a tenth of the model's radius.
             if variance < 0.01 && state.matched < schedule.collapse {

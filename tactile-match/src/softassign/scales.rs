@@ -1,8 +1,10 @@
 //! The average over the scales of the prior, weighted by their evidence.
 
 use super::run::State;
+use crate::Watch;
 use crate::gaussian_process::{Axes, Prior, PriorScales, Request};
 use crate::kernels::{cholesky, combine, normal_equations, solve};
+use std::ops::ControlFlow;
 use tactile_core::vectorised;
 
 // The average over the scales of the prior, weighted by their evidence.
@@ -54,10 +56,10 @@ impl<const D: usize> ScaleAverage<D> {
         request: Request<'_, D>,
         model: &[[f64; D]],
         state: &mut State<D>,
-        variance: f64,
-        affine: f64,
+        (variance, affine): (f64, f64),
         likely: bool,
-    ) -> PriorScales {
+        watch: Watch<'_>,
+    ) -> ControlFlow<(), PriorScales> {
         if !likely {
             self.energies.clear();
             self.energies.resize(LENGTHS.len() * AMPLITUDES.len(), 0.0);
@@ -73,11 +75,13 @@ impl<const D: usize> ScaleAverage<D> {
             if of_length.iter().all(|&energy| energy > limit) {
                 continue;
             }
+            watch()?;
             self.prepare(request, model, l, variance);
             for (a, amplitude) in AMPLITUDES.into_iter().enumerate() {
                 if self.energies[scales + a] > limit {
                     continue;
                 }
+                watch()?;
                 let bending = amplitude * length / LENGTHS[0];
                 let energy = self.fit(request, bending, affine, variance);
                 self.energies[scales + a] = energy;
@@ -96,7 +100,7 @@ impl<const D: usize> ScaleAverage<D> {
             }
         }
         self.place(state);
-        best
+        ControlFlow::Continue(best)
     }
 
     /// Resets all sums.

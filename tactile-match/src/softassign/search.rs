@@ -12,6 +12,7 @@ use super::{
     AnnealedSoftassign, BULK, Mechanism, Rotation, Search, SoftassignWorkspace, Transformation,
     starts,
 };
+use crate::Watch;
 use crate::gaussian_process::PriorScales;
 use nalgebra::{SMatrix, SVector};
 use std::ops::ControlFlow;
@@ -136,24 +137,22 @@ enum Start<const D: usize> {
     Tuples,
 }
 
-type Observer<'a> = &'a mut dyn FnMut(usize, f64) -> ControlFlow<()>;
-
 impl AnnealedSoftassign {
-    pub(crate) fn solve<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        observe: Observer<'_>,
-    ) {
+    pub(crate) fn solve<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>, watch: Watch<'_>) {
         self.begin(ws);
-        let flow = if self.is_large(ws) {
-            self.solve_coarse_to_fine(ws, observe)
+        let mut flow = if self.is_large(ws) {
+            self.solve_coarse_to_fine(ws, watch)
         } else {
             self.prepare(ws);
             match self.search {
-                Search::Near => self.run(ws, Start::Centred, NEAR, observe),
-                Search::Thorough => self.search(ws, observe),
+                Search::Near => self.run(ws, Start::Centred, NEAR, watch),
+                Search::Thorough => self.search(ws, watch),
             }
         };
+        if flow.is_break() && ws.starts == 0 {
+            // Stopped before the first iteration, which is then the answer.
+            flow = self.run(ws, Start::Centred, NEAR, &mut || ControlFlow::Break(()));
+        }
         ws.stopped = flow.is_break();
         self.conclude(ws);
     }
@@ -175,8 +174,8 @@ impl AnnealedSoftassign {
             sigma: sigma.clamp(0.03, NEAR.sigma),
             ..NEAR
         };
-        // The silent observer cannot stop the run.
-        let _ = self.anneal(ws, cooling, &mut |_, _| ControlFlow::Continue(()));
+        // The silent watch cannot stop the run.
+        let _ = self.anneal(ws, cooling, &mut || ControlFlow::Continue(()));
         self.conclude(ws);
     }
 
@@ -246,29 +245,29 @@ impl AnnealedSoftassign {
     fn search<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
-        observe: Observer<'_>,
+        watch: Watch<'_>,
     ) -> ControlFlow<()> {
         let dense = ws.model.len().min(ws.target.len()) >= MIN_DENSE_POINTS;
         let follows = dense && self.has(Mechanism::Motions);
         if follows {
-            self.run(ws, Start::Moved, MOVED, observe)?;
+            self.run(ws, Start::Moved, MOVED, watch)?;
         }
-        if ws.starts == 0 || !self.is_followed(ws, observe)? {
+        if ws.starts == 0 || !self.is_followed(ws, watch)? {
             // Further starts would continue from this answer even if it is wrong.
             std::mem::swap(&mut ws.followed, &mut ws.best);
             (ws.best.energy, ws.best.matched) = (f64::INFINITY, 0.0);
             let runs = std::mem::take(&mut ws.starts);
-            self.try_starts(ws, observe)?;
+            self.try_starts(ws, watch)?;
             if runs > 0 && !self.is_exact(ws) && ws.followed.energy < ws.best.energy {
                 std::mem::swap(&mut ws.followed, &mut ws.best);
             }
             ws.starts += runs;
         }
-        self.look_for_rivals(ws);
+        self.look_for_rivals(ws, watch)?;
         let noisy = ws.best.sigma > ws.annealer.clean_sigma;
         if noisy && !ws.best.noisy && self.has(Mechanism::Scales) && !ws.annealer.rigid.is_active()
         {
-            self.average_scales(ws);
+            self.average_scales(ws, watch)?;
         }
         ControlFlow::Continue(())
     }
@@ -279,14 +278,14 @@ impl AnnealedSoftassign {
     fn is_followed<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
-        observe: Observer<'_>,
+        watch: Watch<'_>,
     ) -> ControlFlow<(), bool> {
         if self.is_exact(ws) || !ws.is_likely() {
             return ControlFlow::Continue(self.is_exact(ws));
         }
         let energy = ws.best.energy;
         let seeded = seeded(ws.spacing);
-        self.run(ws, Start::Patterns, seeded, observe)?;
+        self.run(ws, Start::Patterns, seeded, watch)?;
         // Swaps of a few close points change the energy by less than this per point.
         let least = energy - 0.01 * ws.model.len() as f64;
         ControlFlow::Continue(ws.best.energy >= least && ws.is_likely())
@@ -296,9 +295,9 @@ impl AnnealedSoftassign {
     fn try_starts<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
-        observe: Observer<'_>,
+        watch: Watch<'_>,
     ) -> ControlFlow<()> {
-        self.run(ws, Start::Centred, FAST, observe)?;
+        self.run(ws, Start::Centred, FAST, watch)?;
         if !ws.best.settled && ws.best.iterations >= self.max_iterations {
             return ControlFlow::Continue(()); // the limit would stop every further start as well
         }
@@ -328,7 +327,7 @@ impl AnnealedSoftassign {
             if self.is_done(ws) || self.resolve(ws) {
                 break;
             }
-            self.run(ws, start, cooling, observe)?;
+            self.run(ws, start, cooling, watch)?;
         }
         let open = !dense && self.has(Mechanism::Open);
         if open && is_cold(ws) && !self.is_done(ws) && !self.resolve(ws) {
@@ -336,9 +335,9 @@ impl AnnealedSoftassign {
                 sigma: 0.3 * ws.spacing,
                 ..OPEN
             };
-            self.run(ws, Start::Best, near, observe)?;
+            self.run(ws, Start::Best, near, watch)?;
             if is_cold(ws) {
-                self.run(ws, Start::Centred, OPEN, observe)?;
+                self.run(ws, Start::Centred, OPEN, watch)?;
             }
         }
         ControlFlow::Continue(())
@@ -350,47 +349,53 @@ impl AnnealedSoftassign {
         ws: &mut SoftassignWorkspace<D>,
         start: Start<D>,
         cooling: Cooling,
-        observe: Observer<'_>,
+        watch: Watch<'_>,
     ) -> ControlFlow<()> {
-        if !self.place(ws, start) {
+        if !self.place(ws, start, watch)? {
             return ControlFlow::Continue(());
         }
         let sigma = match start {
             Start::Moved => warmth(ws),
             _ => cooling.sigma,
         };
-        self.anneal(ws, Cooling { sigma, ..cooling }, observe)
+        self.anneal(ws, Cooling { sigma, ..cooling }, watch)
     }
 
     /// Sets `ws.state` to a start: base and warped positions. Returns `false` if the sets have no
     /// such start.
-    fn place<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>, start: Start<D>) -> bool {
+    fn place<const D: usize>(
+        &self,
+        ws: &mut SoftassignWorkspace<D>,
+        start: Start<D>,
+        watch: Watch<'_>,
+    ) -> ControlFlow<(), bool> {
+        const NO_START: ControlFlow<(), bool> = ControlFlow::Continue(false);
         let (model, target) = (&*ws.model, &*ws.target);
         let state = &mut ws.state;
         match start {
             Start::Best => {
                 state.copy_from(&ws.best);
-                return true;
+                return ControlFlow::Continue(true);
             }
             Start::Patterns => {
                 state.copy_from(&ws.best);
                 let rows = 0..model.len();
                 if !ws
                     .patterns
-                    .propose(rows, &state.warped, target, MAX_PATTERN_REACH)
+                    .propose(rows, &state.warped, target, MAX_PATTERN_REACH, watch)?
                 {
-                    return false;
+                    return NO_START;
                 }
                 let pairs = &ws.patterns.pairs;
                 ws.consensus
                     .fit(&mut ws.annealer, SCALES, (model, target), pairs, state);
-                return true;
+                return ControlFlow::Continue(true);
             }
             Start::Moved => {
                 if model.len() >= MIN_DENSE_POINTS {
                     ws.levels.model_order.build(model);
                 }
-                return self.place_by_motions(ws);
+                return self.place_by_motions(ws, watch);
             }
             Start::Centred => state.base.clone_from(&ws.model),
             Start::Moments(rotation) => {
@@ -402,9 +407,9 @@ impl AnnealedSoftassign {
                 let still = ws.frame.still();
                 if !ws
                     .tuples
-                    .find(model, target, ws.spacing, limited, &still, base)
+                    .find((model, target), ws.spacing, limited, &still, base, watch)?
                 {
-                    return false;
+                    return NO_START;
                 }
             }
             Start::Labelling => {
@@ -412,23 +417,27 @@ impl AnnealedSoftassign {
                 // information.
                 let hidden = ws.best.ambiguity >= 0.8 && ws.best.sigma >= 0.999 * REHEAT.sigma;
                 if hidden && !ws.annealer.rigid.is_active() {
-                    return false;
+                    return NO_START;
                 }
                 state.base.clone_from(&ws.model);
-                ws.correspondence.find(&state.base, target);
+                ws.correspondence.find(&state.base, target, watch)?;
                 let pairs = &ws.correspondence.pairs;
                 ws.consensus
                     .fit(&mut ws.annealer, SCALES, (model, target), pairs, state);
-                return true;
+                return ControlFlow::Continue(true);
             }
         }
         state.warped.clone_from(&state.base);
-        true
+        ControlFlow::Continue(true)
     }
 
     /// Moves `ws.state` by the motions of the blocks. Returns `false` if they do not agree on a
     /// field.
-    pub(super) fn place_by_motions<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) -> bool {
+    pub(super) fn place_by_motions<const D: usize>(
+        &self,
+        ws: &mut SoftassignWorkspace<D>,
+        watch: Watch<'_>,
+    ) -> ControlFlow<(), bool> {
         let still = ws.frame.still();
         let state = &mut ws.state;
         let as_it_lies = |p: &[f64; D]| std::array::from_fn(|k| p[k] + still[k]);
@@ -437,8 +446,8 @@ impl AnnealedSoftassign {
         let spacing = mean_spacing(ws.annealer.volume, &ws.target);
         let sets = (&*state.base, &*ws.target);
         let order = &ws.levels.model_order.order;
-        if !ws.motions.find(sets, order, spacing, ws.farthest) {
-            return false;
+        if !ws.motions.find(sets, order, spacing, ws.farthest, watch)? {
+            return ControlFlow::Continue(false);
         }
         let seeds = &ws.motions.seeds;
         let mean = SVector::from(ws.motions.mean());
@@ -475,7 +484,7 @@ impl AnnealedSoftassign {
         let rows = state.base.iter().enumerate();
         let moved = rows.map(|(i, b)| std::array::from_fn(|k| b[k] + field[k][i]));
         state.warped.extend(moved);
-        true
+        ControlFlow::Continue(true)
     }
 
     /// Anneals `ws.state` from its current positions, and keeps it if it is the best so far.
@@ -483,11 +492,11 @@ impl AnnealedSoftassign {
         &self,
         ws: &mut SoftassignWorkspace<D>,
         cooling: Cooling,
-        observe: Observer<'_>,
+        watch: Watch<'_>,
     ) -> ControlFlow<()> {
         ws.matched_before = ws.best.matched;
         (ws.state.energy, ws.state.tail) = (f64::INFINITY, 0.0);
-        let flow = self.anneal_only(ws, cooling, observe);
+        let flow = self.anneal_only(ws, cooling, watch);
         ws.state.far = ws.is_far(&ws.state);
         if ws.starts == 1 {
             ws.best.copy_from(&ws.state);
@@ -512,7 +521,7 @@ impl AnnealedSoftassign {
         &self,
         ws: &mut SoftassignWorkspace<D>,
         cooling: Cooling,
-        observe: Observer<'_>,
+        watch: Watch<'_>,
     ) -> ControlFlow<()> {
         let smaller = ws.model.len().min(ws.target.len()) as f64;
         let schedule = Schedule {
@@ -523,34 +532,45 @@ impl AnnealedSoftassign {
         ws.starts += 1;
         ws.state.trace.clear();
         (ws.state.iterations, ws.state.noisy) = (0, false);
-        ws.annealer.run(&mut ws.state, &schedule, observe)
+        ws.annealer.run(&mut ws.state, &schedule, watch)
     }
 
     /// Averages over the scales of the prior by their evidence, twice: the first average changes
     /// matches and noise level, from which the second starts.
-    fn average_scales<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
+    fn average_scales<const D: usize>(
+        &self,
+        ws: &mut SoftassignWorkspace<D>,
+        watch: Watch<'_>,
+    ) -> ControlFlow<()> {
         let schedule = self.schedule(Cooling {
             sigma: ws.best.sigma,
             ..SLOW
         });
         let ambiguity = ws.annealer.restore(&ws.best, &mut ws.state, &schedule);
         if ambiguity > MOST_SPREAD {
-            return;
+            return ControlFlow::Continue(());
         }
-        let average = |ws: &mut SoftassignWorkspace<D>, likely: bool| {
+        let mut average = |ws: &mut SoftassignWorkspace<D>, likely: bool| {
             let variance = ws.best.sigma * ws.best.sigma;
             let request = ws.annealer.request();
             let (model, best) = (&ws.model, &mut ws.best);
-            ws.scales
-                .average(request, model, best, variance, SCALES.affine, likely)
+            ws.scales.average(
+                request,
+                model,
+                best,
+                (variance, SCALES.affine),
+                likely,
+                watch,
+            )
         };
-        let likeliest = average(ws, false);
+        let likeliest = average(ws, false)?;
         ws.annealer.prior.build(&ws.model, likeliest);
         ws.state.copy_from(&ws.best);
         // A third round moves the warp by only a hundredth of the noise.
         ws.annealer.settle(&mut ws.state, &schedule, 2);
         ws.best.sigma = ws.state.sigma;
-        average(ws, true);
+        average(ws, true)?;
+        ControlFlow::Continue(())
     }
 
     pub(super) fn schedule(&self, mut cooling: Cooling) -> Schedule {

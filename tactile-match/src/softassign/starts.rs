@@ -2,7 +2,9 @@
 
 use super::patterns::Cells;
 use super::{Rotation, mean, squared_distance};
+use crate::Watch;
 use nalgebra::{Matrix3, SMatrix, SVector, SymmetricEigen};
+use std::ops::ControlFlow;
 
 /// The model mapped so that its centroid and covariance equal those of the target, with `rotation`
 /// applied before the stretch.
@@ -136,23 +138,23 @@ impl<const D: usize> Tuples<D> {
     /// rotations beyond about 60°.
     pub(super) fn find(
         &mut self,
-        model: &[[f64; D]],
-        target: &[[f64; D]],
+        (model, target): (&[[f64; D]], &[[f64; D]]),
         spacing: f64,
         limited: bool,
         still: &[f64; D],
         base: &mut Vec<[f64; D]>,
-    ) -> bool {
+        watch: Watch<'_>,
+    ) -> ControlFlow<(), bool> {
         let is_degenerate = spacing.is_nan() || spacing <= 0.0;
         if is_degenerate || model.len().min(target.len()) < 2 * TESTED * D {
-            return false;
+            return ControlFlow::Continue(false);
         }
         self.targets.build(target, 2.0 * spacing);
         self.choose_seeds(model);
         let mut best: Option<(f64, Local<D>)> = None;
         for s in 0..self.seeds.len() {
             let seed = self.seeds[s];
-            let tuple = self.best_tuple(model, target, seed, spacing, limited, still);
+            let tuple = self.best_tuple((model, target), seed, spacing, limited, still, watch)?;
             let Some(map) = tuple else {
                 continue;
             };
@@ -167,10 +169,12 @@ impl<const D: usize> Tuples<D> {
                 break;
             }
         }
-        let Some((_, map)) = best else { return false };
+        let Some((_, map)) = best else {
+            return ControlFlow::Continue(false);
+        };
         base.clear();
         base.extend(model.iter().map(|p| map.apply(p)));
-        true
+        ControlFlow::Continue(true)
     }
 
     fn choose_seeds(&mut self, model: &[[f64; D]]) {
@@ -211,20 +215,22 @@ impl<const D: usize> Tuples<D> {
     /// of their neighbours.
     fn best_tuple(
         &mut self,
-        model: &[[f64; D]],
-        target: &[[f64; D]],
+        (model, target): (&[[f64; D]], &[[f64; D]]),
         seed: usize,
         spacing: f64,
         limited: bool,
         still: &[f64; D],
-    ) -> Option<Local<D>> {
+        watch: Watch<'_>,
+    ) -> ControlFlow<(), Option<Local<D>>> {
         let from = SVector::from(model[seed]);
         self.nearest(model, &model[seed], TESTED * D + 1);
         self.offsets.clear();
         let others = self.near.iter().filter(|&&(_, i)| i != seed);
         self.offsets
             .extend(others.map(|&(_, i)| SVector::from(model[i]) - from));
-        let (basis, inverse) = best_basis(&self.offsets)?;
+        let Some((basis, inverse)) = best_basis(&self.offsets) else {
+            return ControlFlow::Continue(None);
+        };
         // Required fraction of hits: among the tested neighbours, and among more neighbours after a
         // refit.
         let wanted = (0.7 * self.offsets.len() as f64) as usize;
@@ -232,6 +238,7 @@ impl<const D: usize> Tuples<D> {
         // Misfits within a tenth of a spacing per point count as equal.
         let equal = 0.01 * spacing * spacing * self.offsets.len() as f64;
         for j in 0..target.len() {
+            watch()?;
             let to = SVector::from(target[j]);
             self.near.clear();
             let mut radius = 2.0 * spacing;
@@ -285,7 +292,7 @@ impl<const D: usize> Tuples<D> {
                 }
             }
         }
-        best.map
+        ControlFlow::Continue(best.map)
     }
 
     /// Number of neighbours that the map puts onto a target, and the sum of their squared

@@ -28,7 +28,7 @@ fn a_batch_of_small_matches_allocates_nothing_after_the_first() {
     let matcher = AnnealedSoftassign::default();
     let mut workspace = SoftassignWorkspace::default();
     let mut run = |k: usize| {
-        let go = |_, _| ControlFlow::Continue(());
+        let go = || ControlFlow::Continue(());
         let found = matcher
             .match_points_with(&mut workspace, &model, &targets[k % 2], go)
             .expect("finite points");

@@ -112,7 +112,7 @@ fn what_a_workspace_did_before_changes_no_answer_and_saves_the_memory() {
     let check = |workspace: &mut SoftassignWorkspace<2>,
                  (model, target): &(Vec<Point2<f64>>, Vec<Point2<f64>>),
                  seen: &mut dyn FnMut(SoftassignMatch<'_, 2>)| {
-        let go = |_, _| ControlFlow::Continue(());
+        let go = || ControlFlow::Continue(());
         let found = AnnealedSoftassign::default().match_points_with(workspace, model, target, go);
         seen(found.unwrap());
     };

@@ -143,7 +143,7 @@ fn a_caller_who_stops_has_an_answer_for_every_point() {
     let scene = scene::<2>(0.0, 0);
     let mut workspace = SoftassignWorkspace::default();
     let found = AnnealedSoftassign::default()
-        .match_points_with(&mut workspace, &scene.model, &scene.target, |_, _| {
+        .match_points_with(&mut workspace, &scene.model, &scene.target, || {
             ControlFlow::Break(())
         })
         .expect("good points");
@@ -157,7 +157,7 @@ fn a_grown_workspace_allocates_nothing_and_gives_the_same_bits() {
     let scene = scene::<3>(0.0, 0);
     let mut workspace = SoftassignWorkspace::default();
     let matcher = AnnealedSoftassign::default();
-    let go = |_, _| ControlFlow::Continue(());
+    let go = || ControlFlow::Continue(());
     let first: Vec<Point<f64, 3>> = matcher
         .match_points_with(&mut workspace, &scene.model, &scene.target, go)
         .expect("good points")

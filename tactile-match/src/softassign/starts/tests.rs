@@ -27,7 +27,9 @@ fn a_stretched_and_cropped_grid_is_put_onto_its_targets() {
     target.extend((0..kept / 10).map(|i| [1.1 * scatter(i + 400, 0), 1.1 * scatter(i + 400, 1)]));
     let mut tuples = Tuples::default();
     let mut base = Vec::new();
-    assert!(tuples.find(&model, &target, 0.12, true, &[0.0; 2], &mut base));
+    let go = &mut || ControlFlow::Continue(());
+    let found = tuples.find((&model, &target), 0.12, true, &[0.0; 2], &mut base, go);
+    assert_eq!(found, ControlFlow::Continue(true));
     for (p, b) in model.iter().zip(&base) {
         let truth = moved(p);
         // Well below the spacing: the fit uses exact pairs and a few outliers hit by chance.

@@ -16,13 +16,12 @@ fn options_out_of_range_are_errors() {
 }
 
 #[test]
-fn the_callback_hears_every_iteration_and_stops_the_search() {
+fn the_callback_stops_the_search() {
     let scene = Scene::<2>::bent(52, 0.06, 23);
     let mut heard = 0;
     let mut workspace = SoftassignWorkspace::default();
     let found = AnnealedSoftassign::default()
-        .match_points_with(&mut workspace, &scene.model, &scene.target, |_, energy| {
-            assert!(energy.is_finite());
+        .match_points_with(&mut workspace, &scene.model, &scene.target, || {
             heard += 1;
             if heard == 4 {
                 ControlFlow::Break(())
@@ -31,10 +30,8 @@ fn the_callback_hears_every_iteration_and_stops_the_search() {
             }
         })
         .unwrap();
-    assert_eq!(
-        (heard, found.report.stop, found.report.iterations),
-        (4, StopReason::Cancelled, 4)
-    );
+    assert_eq!((heard, found.report.stop), (4, StopReason::Cancelled));
+    assert!(found.report.iterations <= 4);
 }
 
 /// Clean, noisy and unusable pairs of different sizes: the use of a workspace for one of them must
@@ -75,7 +72,7 @@ fn a_batch_gives_the_bits_of_single_matches() {
             }
         }
     };
-    let go = |_, _| ControlFlow::Continue(());
+    let go = || ControlFlow::Continue(());
     let mut workspace = SoftassignWorkspace::default();
     let one = |&(model, target): &_| {
         let found = matcher.match_points_with(&mut workspace, model, target, go)?;
