@@ -8,8 +8,8 @@ use super::{
     buffers::Buffers,
     centres::Centres,
     equations::Equations,
-    iterative::{Iterative, Run, Watch},
-    system::{Setting, System},
+    iterative::{Iterative, Run},
+    system::{Setting, System, Watch},
 };
 use crate::{
     FitOptions, Kernel, Progress, R2LogR, Smoothing, Spline, TpsError,
@@ -48,8 +48,8 @@ impl<const D: usize, const M: usize, K: Kernel> Spline<D, M, K> {
     /// Like [`fit`](Self::fit), but reports the progress of an iterative solver to `watch`, which
     /// may stop it.
     ///
-    /// A direct solver does not report. If stopped during the iteration, the fit returns the best
-    /// spline so far, with its residual in the report.
+    /// A direct solver reports its factored columns. If stopped during an iteration, the fit returns
+    /// the best spline so far, with its residual in the report.
     ///
     /// ```
     /// use core::ops::ControlFlow;
@@ -450,7 +450,7 @@ impl<const D: usize, K: Kernel> Factorization<D, K> {
                 return Err(TpsError::Stopped);
             }
         } else {
-            system.factor(&setting, centre_weights, lambda)?;
+            system.factor(&setting, centre_weights, lambda, watch)?;
         }
         Ok(())
     }

@@ -11,7 +11,7 @@ use super::{
     affine_basis::AffineBasis,
     buffers::{Buffers, Vectors},
     centres::Centres,
-    system::{Setting, System},
+    system::{Setting, System, Watch},
 };
 use crate::{
     FitReport, Kernel, Progress, StopReason,
@@ -29,9 +29,6 @@ const COARSE_POINTS: usize = 512;
 
 /// Maximum number of steps.
 const STEPS: usize = 200;
-
-/// A callback that receives the progress of a fit and may stop it.
-pub(super) type Watch<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + 'a;
 
 /// Points from coarse to fine, with their preconditioner.
 #[derive(Clone, Debug, Default)]
@@ -551,7 +548,8 @@ impl<K: Kernel, const D: usize> Ordered<'_, K, D> {
             centres: local,
             rank_tolerance: 0.0,
         };
-        system.factor(&setting, weights, self.lambda).is_ok()
+        let watch = &mut |_: &Progress| ControlFlow::Continue(());
+        system.factor(&setting, weights, self.lambda, watch).is_ok()
     }
 }
 

@@ -1,5 +1,7 @@
 //! The projected matrix of a spline's equations: assembled, factored or decomposed, and solved.
 
+use core::ops::ControlFlow;
+
 use super::{
     affine_basis::{AffineBasis, subtract},
     centres::Centres,
@@ -7,11 +9,14 @@ use super::{
     triangle::Triangle,
 };
 use crate::{
-    Kernel, TpsError,
+    Kernel, Progress, TpsError,
     lanes::{Job, Lane, dispatch, dot, squared_distance},
     smoothing::least_gcv,
     span::{Coefficients, MAX, Span},
 };
+
+/// A callback that receives the progress of a fit and may stop it.
+pub(super) type Watch<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + 'a;
 
 /// The inputs of a system.
 pub(super) struct Setting<'a, K, const D: usize> {
@@ -49,18 +54,24 @@ impl<const D: usize> System<D> {
         setting: &Setting<'_, K, D>,
         weights: &[f64],
         lambda: f64,
+        watch: &mut Watch<'_>,
     ) -> Result<(), TpsError> {
         self.spectrum = None;
         let size = self.assemble(setting, weights, lambda > 0.0);
         self.matrix.add_to_diagonal(lambda);
-        if self.matrix.factor().is_err() {
+        let total = self.matrix.n;
+        let mut watch = |done| watch(&Progress::new(done, total));
+        if let Err(error) = self.matrix.factor(&mut watch) {
+            if error == TpsError::Stopped {
+                return Err(error);
+            }
             // If points nearly coincide, rounding has made the matrix indefinite. A λ of the size
             // of this rounding changes values by no more than it. A kernel that is not positive
             // definite fails again.
             self.assemble(setting, weights, lambda > 0.0);
             let rounding = f64::EPSILON * self.active.len() as f64 * (size + lambda);
             self.matrix.add_to_diagonal(lambda + rounding);
-            self.matrix.factor()?;
+            self.matrix.factor(&mut watch)?;
             self.condition = f64::INFINITY;
             return Ok(());
         }

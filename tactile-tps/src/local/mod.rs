@@ -270,18 +270,29 @@ impl<const D: usize> LocalField<D> {
     /// The field at any points: O(1) time for each point with nearby pairs.
     #[must_use]
     pub fn at(&self, points: &[Point<f64, D>]) -> Vec<LocalValue<D>> {
-        let mut found = Vec::with_capacity(points.len());
         // Nothing stops this evaluation.
+        let values = self.at_watched(points, || ControlFlow::Continue(()));
+        values.unwrap_or_default()
+    }
+
+    /// Like [`at`](Self::at). `watch` is called many times a second and may stop it.
+    ///
+    /// # Errors
+    /// [`TpsError::Stopped`].
+    pub fn at_watched(
+        &self,
+        points: &[Point<f64, D>],
+        mut watch: impl FnMut() -> ControlFlow<()>,
+    ) -> Result<Vec<LocalValue<D>>, TpsError> {
+        let mut found = Vec::with_capacity(points.len());
         let mut patch = PairPatch::default();
-        let _ = self.walk(&mut patch, points, false, &mut found, |_| {
-            ControlFlow::Continue(())
-        });
+        self.walk(&mut patch, points, false, &mut found, |_| watch())?;
         let value = |found: Found<D>| {
             let mut value = found.value;
             value.mark(self.usual);
             value
         };
-        found.into_iter().map(value).collect()
+        Ok(found.into_iter().map(value).collect())
     }
 
     /// Number of pairs in a patch, and number of points that it serves.
