@@ -80,11 +80,13 @@ pub use tactile_fem as fem;
 #[cfg(feature = "inclusion")]
 pub mod inclusion;
 pub mod pipeline;
+mod point_grid;
 mod strain_between;
 mod strain_kinematics;
 mod strain_series;
 
 pub use pipeline::{Measurement, Object, Pipeline, Press};
+pub use point_grid::PointGrid;
 pub use strain_between::{
     PairsDoubt, StrainAt, StrainBetween, StrainBetweenError, StrainBetweenOptions, strain_between,
 };

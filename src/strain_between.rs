@@ -278,6 +278,8 @@ pub struct StrainAt<const D: usize> {
     pub strain: Matrix3<f64>,
     /// Standard error of the strain, which grows away from the matched points.
     pub standard_error: Matrix3<f64>,
+    /// The local fit.
+    pub(crate) value: LocalValue<D>,
 }
 
 /// Strain of the deformation from the first set to the second.
@@ -512,7 +514,20 @@ impl<const D: usize> StrainBetween<D> {
         points: &[Point<f64, D>],
         measure: &dyn StrainMeasure,
     ) -> Result<Vec<StrainAt<D>>, StrainBetweenError> {
-        let values = self.field.at(points);
+        self.at_watched(points, measure, || ControlFlow::Continue(()))
+    }
+
+    /// Like [`at`](Self::at). `watch` is called many times a second and may stop it.
+    ///
+    /// # Errors
+    /// Those of [`at`](Self::at), and [`TpsError::Stopped`](crate::tps::TpsError::Stopped).
+    pub fn at_watched(
+        &self,
+        points: &[Point<f64, D>],
+        measure: &dyn StrainMeasure,
+        watch: impl FnMut() -> ControlFlow<()>,
+    ) -> Result<Vec<StrainAt<D>>, StrainBetweenError> {
+        let values = self.field.at_watched(points, watch)?;
         let mut strained = StrainField::from_gradients(&gradients_of(&values), None, measure)?;
         for &folded in &strained.folded {
             strained.strains[folded].fill(f64::NAN);
@@ -521,6 +536,7 @@ impl<const D: usize> StrainBetween<D> {
             displacement: value.displacement,
             strain: *strain,
             standard_error: strain_error(value, measure),
+            value: *value,
         };
         Ok(values.iter().zip(&strained.strains).map(at).collect())
     }

@@ -2,13 +2,12 @@
 
 use crate::elasticity::kinematics::StrainQuantities;
 use crate::elasticity::strain::StrainMeasure;
-use crate::strain_between::StrainBetween;
+use crate::strain_between::{StrainAt, StrainBetween};
 use crate::tps::LocalValue;
-use nalgebra::Point;
 
-impl<const D: usize> StrainBetween<D> {
-    /// Quantities derived from the deformation gradient at any points in the space of the first
-    /// set, each with its standard error. All are NaN if the deformation folds.
+impl<const D: usize> StrainAt<D> {
+    /// Quantities derived from the deformation gradient, each with its standard error. All are NaN if
+    /// the deformation folds.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -24,36 +23,31 @@ impl<const D: usize> StrainBetween<D> {
     ///     .collect();
     /// let options = StrainBetweenOptions::default();
     /// let found = StrainBetween::of_known_pairs(&before, &after, &options)?;
-    /// let at = found.kinematics_at(&[Point2::new(3.5, 3.5)], &Biot)[0];
+    /// let at = found.at(&[Point2::new(3.5, 3.5)], &Biot)?[0].kinematics(&Biot);
     /// assert!((at.rotation_rad - 0.3).abs() < 1e-6 && (at.size_ratio - 1.1).abs() < 1e-6);
     /// assert!((at.principal[0] - 0.1).abs() < 1e-6);
     /// # Ok::<(), tactile_imaging::StrainBetweenError>(())
     /// ```
     #[must_use]
-    pub fn kinematics_at(
-        &self,
-        points: &[Point<f64, D>],
-        measure: &dyn StrainMeasure,
-    ) -> Vec<StrainQuantities> {
-        read(&self.field.at(points), measure)
-    }
-
-    /// Like [`kinematics_at`](Self::kinematics_at), at each matched point of the first set.
-    #[must_use]
-    pub fn kinematics(&self, measure: &dyn StrainMeasure) -> Vec<StrainQuantities> {
-        read(&self.values, measure)
+    pub fn kinematics(&self, measure: &dyn StrainMeasure) -> StrainQuantities {
+        read(&self.value, measure)
     }
 }
 
-fn read<const D: usize>(
-    values: &[LocalValue<D>],
-    measure: &dyn StrainMeasure,
-) -> Vec<StrainQuantities> {
-    let read = values.iter().map(|value| {
-        let gradient = value.gradient.fixed_resize(0.0);
-        let covariance = value.gradient_covariance.fixed_resize(0.0);
-        let found = StrainQuantities::of(&gradient, &covariance, D, measure);
-        found.unwrap_or_else(|_| StrainQuantities::undefined())
-    });
-    read.collect()
+impl<const D: usize> StrainBetween<D> {
+    /// The [kinematics](StrainAt::kinematics) at each matched point of the first set.
+    #[must_use]
+    pub fn kinematics(&self, measure: &dyn StrainMeasure) -> Vec<StrainQuantities> {
+        self.values
+            .iter()
+            .map(|value| read(value, measure))
+            .collect()
+    }
+}
+
+fn read<const D: usize>(value: &LocalValue<D>, measure: &dyn StrainMeasure) -> StrainQuantities {
+    let gradient = value.gradient.fixed_resize(0.0);
+    let covariance = value.gradient_covariance.fixed_resize(0.0);
+    let found = StrainQuantities::of(&gradient, &covariance, D, measure);
+    found.unwrap_or_else(|_| StrainQuantities::undefined())
 }
