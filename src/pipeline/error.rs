@@ -6,7 +6,7 @@ use crate::matching::MatchError;
 use crate::sfs::SfsError;
 use crate::tps::TpsError;
 
-/// Why a measurement failed. Frames are counted from 0 in the fields and from 1 in the messages.
+/// Why a measurement failed. Frames are counted from 0, as in the calls.
 ///
 /// ```
 /// use tactile_imaging::pipeline::{Object, Pipeline, PipelineError};
@@ -18,9 +18,9 @@ use crate::tps::TpsError;
 /// press.add_frame(empty.view());
 /// let error = press.surface(0).unwrap_err();
 /// assert_eq!(error, PipelineError::NoContact { frame: 0 });
-/// assert!(error.to_string().starts_with("frame 1 shows no contact"));
+/// assert!(error.to_string().starts_with("frame 0 shows no contact"));
 /// let error = press.contact(7).unwrap_err();
-/// assert_eq!(error.to_string(), "there is no frame 8: the press has 1");
+/// assert_eq!(error.to_string(), "there is no frame 7: the press has 1");
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -45,7 +45,7 @@ pub enum PipelineError {
     #[error("the waveguide or the object is not physical: {0}")]
     Material(#[source] ElasticityError),
     /// A press of known force cannot be used.
-    #[error("press {} of known force is not usable: {reason}", press + 1)]
+    #[error("press {press} of known force is not usable: {reason}")]
     Check {
         /// Index of the press, counted from 0.
         press: usize,
@@ -56,7 +56,7 @@ pub enum PipelineError {
     #[error(transparent)]
     Setting(#[from] InvalidOption),
     /// There is no frame with this index.
-    #[error("there is no frame {}: the press has {frames}", frame + 1)]
+    #[error("there is no frame {frame}: the press has {frames}")]
     NoSuchFrame {
         /// The requested frame.
         frame: usize,
@@ -64,7 +64,7 @@ pub enum PipelineError {
         frames: usize,
     },
     /// A frame that is read on demand could not be read.
-    #[error("frame {}: {reason}", frame + 1)]
+    #[error("frame {frame}: {reason}")]
     Unreadable {
         /// The frame.
         frame: usize,
@@ -73,9 +73,8 @@ pub enum PipelineError {
     },
     /// The surface of this frame was not reconstructed, because the measurement has many frames.
     #[error(
-        "frame {}: no surface was reconstructed; of {frames} frames only those with a \
-         strain have one (`Press::surface` computes any)",
-        frame + 1
+        "frame {frame}: no surface was reconstructed; of {frames} frames only those with a \
+         strain have one (`Press::surface` computes any)"
     )]
     NotReconstructed {
         /// The frame.
@@ -84,7 +83,7 @@ pub enum PipelineError {
         frames: usize,
     },
     /// No contact could be measured in a frame.
-    #[error("frame {}: {source}", frame + 1)]
+    #[error("frame {frame}: {source}")]
     Contact {
         /// The frame.
         frame: usize,
@@ -93,9 +92,9 @@ pub enum PipelineError {
     },
     /// The result of a contact stage does not fit the frame.
     #[error(
-        "frame {}: the contact stage gave a mask of {} × {} pixels for a box of {} × {} pixels in \
-         a frame of {} × {}",
-        frame + 1, mask.0, mask.1, region.0, region.1, image.0, image.1
+        "frame {frame}: the contact stage gave a mask of {} × {} pixels for a box of {} × {} \
+         pixels in a frame of {} × {}",
+        mask.0, mask.1, region.0, region.1, image.0, image.1
     )]
     ContactMask {
         /// The frame.
@@ -109,8 +108,8 @@ pub enum PipelineError {
     },
     /// A frame shows no contact, but a contact is needed.
     #[error(
-        "frame {} shows no contact: it does not differ from the reference by more than its noise",
-        frame + 1
+        "frame {frame} shows no contact: it does not differ from the reference by more than its \
+         noise"
     )]
     NoContact {
         /// The frame.
@@ -118,9 +117,8 @@ pub enum PipelineError {
     },
     /// A frame shows no contact, but its signal has the opposite sign of a contact.
     #[error(
-        "frame {} shows no contact, though it is up to {:.0} grey levels {} than the reference: \
-         were the two swapped, or has the light changed?",
-        frame + 1,
+        "frame {frame} shows no contact, though it is up to {:.0} grey levels {} than the \
+         reference: were the two swapped, or has the light changed?",
         .grey.abs(),
         if *.grey < 0.0 { "darker" } else { "brighter" }
     )]
@@ -132,9 +130,8 @@ pub enum PipelineError {
     },
     /// The force of a frame is unknown: there is neither a calibration nor a gauge reading.
     #[error(
-        "the force of frame {} is unknown: without a calibration a gauge reading is needed \
-         (`force_N`)",
-        frame + 1
+        "the force of frame {frame} is unknown: without a calibration a gauge reading is needed \
+         (`force_N`)"
     )]
     NoForce {
         /// The frame.
@@ -148,8 +145,7 @@ pub enum PipelineError {
     NoWholeContact,
     /// The time of a frame is negative or not finite.
     #[error(
-        "the time of frame {} must be zero or a positive number of seconds, found {found_s}",
-        frame + 1
+        "the time of frame {frame} must be zero or a positive number of seconds, found {found_s}"
     )]
     Time {
         /// The frame.
@@ -158,10 +154,7 @@ pub enum PipelineError {
         found_s: f64,
     },
     /// Frames are not in the order of time.
-    #[error(
-        "frame {} was taken at {found_s} s, before the preceding frame ({before_s} s)",
-        frame + 1
-    )]
+    #[error("frame {frame} was taken at {found_s} s, before the preceding frame ({before_s} s)")]
     TimeDecreases {
         /// The frame.
         frame: usize,
@@ -177,7 +170,7 @@ pub enum PipelineError {
         found: usize,
     },
     /// No surface could be reconstructed.
-    #[error("frame {}: no surface: {source}", frame + 1)]
+    #[error("frame {frame}: no surface: {source}")]
     Surface {
         /// The frame.
         frame: usize,
@@ -185,7 +178,7 @@ pub enum PipelineError {
         source: SfsError,
     },
     /// The control points could not be matched.
-    #[error("frames {} and {} cannot be matched: {source}", from + 1, to + 1)]
+    #[error("frames {from} and {to} cannot be matched: {source}")]
     Match {
         /// The first frame.
         from: usize,
@@ -196,8 +189,7 @@ pub enum PipelineError {
     },
     /// Too few control points have partners.
     #[error(
-        "frames {} and {}: only {found} control points have a partner, {expected} are needed",
-        from + 1, to + 1
+        "frames {from} and {to}: only {found} control points have a partner, {expected} are needed"
     )]
     TooFewMatches {
         /// The first frame.
@@ -210,7 +202,7 @@ pub enum PipelineError {
         found: usize,
     },
     /// The displacement between two frames has no warp.
-    #[error("frames {} and {}: no warp fits the matches: {source}", from + 1, to + 1)]
+    #[error("frames {from} and {to}: no warp fits the matches: {source}")]
     Warp {
         /// The first frame.
         from: usize,
@@ -220,7 +212,7 @@ pub enum PipelineError {
         source: TpsError,
     },
     /// The strain between two frames could not be computed.
-    #[error("frames {} and {}: no strain: {source}", from + 1, to + 1)]
+    #[error("frames {from} and {to}: no strain: {source}")]
     Strain {
         /// The first frame.
         from: usize,
@@ -231,7 +223,7 @@ pub enum PipelineError {
     },
     /// The contact is not a single flat face under uniaxial load, so no modulus can be derived from
     /// it.
-    #[error("frame {}: {problem}", frame + 1)]
+    #[error("frame {frame}: {problem}")]
     NotUniaxial {
         /// The frame.
         frame: usize,
@@ -240,9 +232,8 @@ pub enum PipelineError {
     },
     /// The points of a flat face cannot be matched.
     #[error(
-        "frames {} and {}: the points of a flat face cannot be matched; its strain follows from \
-         its outline",
-        from + 1, to + 1
+        "frames {from} and {to}: the points of a flat face cannot be matched; its strain follows \
+         from its outline"
     )]
     FlatFace {
         /// The first frame.
@@ -356,6 +347,34 @@ impl PipelineError {
     /// ```
     #[must_use]
     pub fn frame(&self) -> Option<usize> {
+        self.clone().frames().pop().copied()
+    }
+
+    /// This error with its frames and loads counted from `first` instead of 0, for messages.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::PipelineError;
+    /// let error = PipelineError::NoContact { frame: 2 };
+    /// assert!(error.to_string().starts_with("frame 2 shows no contact"));
+    /// assert!(error.numbered_from(1).to_string().starts_with("frame 3 shows no contact"));
+    /// ```
+    #[must_use]
+    pub fn numbered_from(mut self, first: usize) -> Self {
+        for frame in self.frames() {
+            *frame += first;
+        }
+        match self {
+            Self::Check { press, reason } => Self::Check {
+                press: press + first,
+                reason,
+            },
+            Self::Modulus(source) => Self::Modulus(source.numbered_from(first)),
+            error => error,
+        }
+    }
+
+    /// The frames in the message.
+    fn frames(&mut self) -> Vec<&mut usize> {
         match self {
             Self::NoSuchFrame { frame, .. }
             | Self::Unreadable { frame, .. }
@@ -368,13 +387,13 @@ impl PipelineError {
             | Self::Time { frame, .. }
             | Self::TimeDecreases { frame, .. }
             | Self::NotUniaxial { frame, .. }
-            | Self::Surface { frame, .. } => Some(*frame),
-            Self::Match { to, .. }
-            | Self::FlatFace { to, .. }
-            | Self::TooFewMatches { to, .. }
-            | Self::Warp { to, .. }
-            | Self::Strain { to, .. } => Some(*to),
-            _ => None,
+            | Self::Surface { frame, .. } => vec![frame],
+            Self::Match { from, to, .. }
+            | Self::FlatFace { from, to }
+            | Self::TooFewMatches { from, to, .. }
+            | Self::Warp { from, to, .. }
+            | Self::Strain { from, to, .. } => vec![from, to],
+            _ => Vec::new(),
         }
     }
 }

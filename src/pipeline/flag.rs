@@ -4,8 +4,8 @@ use super::error::PipelineError;
 use crate::elasticity::modulus::Warning;
 use crate::force::Estimate;
 
-/// A caution about a result. Frames are counted from 0 in the fields and from 1 in the messages. It
-/// also implements [`Error`](std::error::Error), for callers that reject results with a caution.
+/// A caution about a result. Frames are counted from 0, as in the calls. It also implements
+/// [`Error`](std::error::Error), for callers that reject results with a caution.
 ///
 /// ```
 /// use tactile_imaging::force::{CalibrationPair, Estimate};
@@ -30,7 +30,7 @@ use crate::force::Estimate;
 ///         |flag| matches!(flag, Flag::GaugeDisagrees { measured_n, .. } if *measured_n < 0.6)
 ///     )
 /// );
-/// assert_eq!(flags[0].to_string(), "frame 1: the contact reaches the frame's edge");
+/// assert_eq!(flags[0].to_string(), "frame 0: the contact reaches the frame's edge");
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -42,7 +42,7 @@ use crate::force::Estimate;
 #[non_exhaustive]
 pub enum Flag {
     /// Some of the contact's pixels are saturated, so force and radius are too low.
-    #[error("frame {}: {:.2} % of the contact is saturated", frame + 1, 100.0 * share)]
+    #[error("frame {frame}: {:.2} % of the contact is saturated", 100.0 * share)]
     Saturated {
         /// The frame.
         frame: usize,
@@ -50,13 +50,13 @@ pub enum Flag {
         share: f64,
     },
     /// The signal is outside the range of the calibration.
-    #[error("frame {}: outside the range of the calibration", frame + 1)]
+    #[error("frame {frame}: outside the range of the calibration")]
     OutOfCalibration {
         /// The frame.
         frame: usize,
     },
     /// The contact reaches the edge of the frame.
-    #[error("frame {}: the contact reaches the frame's edge", frame + 1)]
+    #[error("frame {frame}: the contact reaches the frame's edge")]
     TouchesEdge {
         /// The frame.
         frame: usize,
@@ -64,9 +64,9 @@ pub enum Flag {
     /// The contact is wider than the frame: most of it is outside the view, or the light has
     /// changed everywhere.
     #[error(
-        "frame {}: the contact, {:.3} mm in radius, is wider than the frame: its size is \
+        "frame {frame}: the contact, {:.3} mm in radius, is wider than the frame: its size is \
          undetermined",
-        frame + 1, 1e3 * radius_m
+        1e3 * radius_m
     )]
     WiderThanFrame {
         /// The frame.
@@ -76,8 +76,9 @@ pub enum Flag {
     },
     /// The standard error of a number is larger than the number.
     #[error(
-        "frame {}: the {quantity} is undetermined: its error ({}) is larger than its value ({})",
-        frame + 1, in_unit(quantity, *standard_error), in_unit(quantity, *value)
+        "frame {frame}: the {quantity} is undetermined: its error ({}) is larger than its value \
+         ({})",
+        in_unit(quantity, *standard_error), in_unit(quantity, *value)
     )]
     CannotBeTold {
         /// The frame.
@@ -99,7 +100,7 @@ pub enum Flag {
     },
     /// The frame shows more than one contact. The largest is measured, and the theory assumes a
     /// single contact.
-    #[error("frame {}: {} besides the one measured", frame + 1, other_contacts(*others))]
+    #[error("frame {frame}: {} besides the one measured", other_contacts(*others))]
     SeveralContacts {
         /// The frame.
         frame: usize,
@@ -126,7 +127,7 @@ pub enum Flag {
         uneven: f64,
     },
     /// The fit of the contact's profile did not converge.
-    #[error("frame {}: the profile's fit did not converge", frame + 1)]
+    #[error("frame {frame}: the profile's fit did not converge")]
     ProfileNotConverged {
         /// The frame.
         frame: usize,
@@ -134,8 +135,8 @@ pub enum Flag {
     /// The pressure profile is not that of a ball: the contact radius belongs to the best-fitting
     /// ball.
     #[error(
-        "frame {}: the pressure deviates from that of a ball by {:.1} % of its peak",
-        frame + 1, 100.0 * misfit
+        "frame {frame}: the pressure deviates from that of a ball by {:.1} % of its peak",
+        100.0 * misfit
     )]
     NotABall {
         /// The frame.
@@ -146,8 +147,8 @@ pub enum Flag {
     /// The object is a punch, which touches with its whole face, but the contact has another
     /// radius.
     #[error(
-        "frame {}: the contact's radius is {:.3} mm, that of the punch {:.3} mm",
-        frame + 1, 1e3 * radius_m, 1e3 * punch_m
+        "frame {frame}: the contact's radius is {:.3} mm, that of the punch {:.3} mm",
+        1e3 * radius_m, 1e3 * punch_m
     )]
     NotThePunch {
         /// The frame.
@@ -160,9 +161,8 @@ pub enum Flag {
     /// No gel can withstand the mean stress, or none would show it. The unit of the forces, the
     /// light or the pixel size is probably wrong.
     #[error(
-        "frame {}: a mean stress of {mean_stress_pa:.1e} Pa is {}: are the forces in newtons \
+        "frame {frame}: a mean stress of {mean_stress_pa:.1e} Pa is {}: are the forces in newtons \
          and the pixel sizes in the stated unit?",
-        frame + 1,
         if *mean_stress_pa > 1.0e3 { "more than any gel withstands" } else { "less than any gel shows" }
     )]
     UnlikelyStress {
@@ -173,7 +173,7 @@ pub enum Flag {
     },
     /// The outline of the contact is not round: the pixel sizes are misstated, the lens distorts,
     /// or the object is not a ball.
-    #[error("frame {}: the contact is {:.1} % longer than wide", frame + 1, 100.0 * elongation)]
+    #[error("frame {frame}: the contact is {:.1} % longer than wide", 100.0 * elongation)]
     NotRound {
         /// The frame.
         frame: usize,
@@ -184,9 +184,9 @@ pub enum Flag {
     /// and radius of the light differ from those of the pressure. A sensor calibrated from frames
     /// has the local curve and avoids this.
     #[error(
-        "frame {}: the calibration's pairs deviate from a line by {:.1} % of the full scale: light \
-         is not proportional to pressure",
-        frame + 1, 100.0 * departure
+        "frame {frame}: the calibration's pairs deviate from a line by {:.1} % of the full scale: \
+         light is not proportional to pressure",
+        100.0 * departure
     )]
     LightNotProportional {
         /// The frame.
@@ -195,9 +195,7 @@ pub enum Flag {
         departure: f64,
     },
     /// The calibration and the gauge disagree by more than three standard errors and two per cent.
-    #[error(
-        "frame {}: {measured_n:.4} N measured, but the gauge read {gauge_n:.4} N", frame + 1
-    )]
+    #[error("frame {frame}: {measured_n:.4} N measured, but the gauge read {gauge_n:.4} N")]
     GaugeDisagrees {
         /// The frame.
         frame: usize,
@@ -209,9 +207,8 @@ pub enum Flag {
     /// The pressure rises towards the outline of a flat face, as it does if the face sticks. The
     /// face then does not spread freely, and its strain is not that of its material.
     #[error(
-        "frame {}: the pressure rises towards the outline (to {edge_ratio:.2} times that further \
-         inside): the face sticks, and its strain is not that of its material",
-        frame + 1
+        "frame {frame}: the pressure rises towards the outline (to {edge_ratio:.2} times that \
+         further inside): the face sticks, and its strain is not that of its material"
     )]
     FaceSticks {
         /// The frame.
@@ -309,6 +306,60 @@ pub enum Flag {
         )]
         warning: Warning,
     },
+}
+
+impl Flag {
+    /// The frame that the caution is about. `None` if it is about several, or about the result.
+    fn frame(&mut self) -> Option<&mut usize> {
+        match self {
+            Self::Saturated { frame, .. }
+            | Self::OutOfCalibration { frame }
+            | Self::TouchesEdge { frame }
+            | Self::WiderThanFrame { frame, .. }
+            | Self::CannotBeTold { frame, .. }
+            | Self::OppositeSignal { frame, .. }
+            | Self::SeveralContacts { frame, .. }
+            | Self::ProfileNotConverged { frame }
+            | Self::NotABall { frame, .. }
+            | Self::NotThePunch { frame, .. }
+            | Self::UnlikelyStress { frame, .. }
+            | Self::NotRound { frame, .. }
+            | Self::LightNotProportional { frame, .. }
+            | Self::GaugeDisagrees { frame, .. }
+            | Self::FaceSticks { frame, .. } => Some(frame),
+            _ => None,
+        }
+    }
+
+    /// This caution with its frame or load counted from `first` instead of 0, for messages.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::Flag;
+    /// let caution = Flag::TouchesEdge { frame: 2 }.numbered_from(1);
+    /// assert_eq!(caution.to_string(), "frame 3: the contact reaches the frame's edge");
+    /// assert_eq!(caution.without_frame(), "the contact reaches the frame's edge");
+    /// ```
+    #[must_use]
+    pub fn numbered_from(mut self, first: usize) -> Self {
+        if let Some(frame) = self.frame() {
+            *frame += first;
+        }
+        match self {
+            Self::Assumption { warning } => Self::Assumption {
+                warning: warning.numbered_from(first),
+            },
+            caution => caution,
+        }
+    }
+
+    /// The message without its frame, for a place that names the frame.
+    #[must_use]
+    pub fn without_frame(&self) -> String {
+        let message = self.to_string();
+        let frame = self.clone().frame().map(|frame| format!("frame {frame}: "));
+        let words = frame.and_then(|frame| message.strip_prefix(&frame).map(str::to_owned));
+        words.unwrap_or(message)
+    }
 }
 
 /// Plausible mean stresses of contacts: silicone rubbers tear at several megapascals, and one grey

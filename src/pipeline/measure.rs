@@ -80,6 +80,7 @@ impl Press<'_> {
         let time = self.time_dependence().ok().flatten();
         flags.extend(self.time_flags(time.as_ref()));
         Measurement {
+            first_frame: 0,
             youngs_modulus_pa,
             time,
             checked_gain: self.pipeline().settings().checked_gain,

@@ -232,6 +232,56 @@ pub struct Measurement {
     pub flags: Vec<Flag>,
     /// Record of the stages that ran and those that were skipped.
     pub report: Report,
+    /// Number of the first frame in messages.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub(super) first_frame: usize,
+}
+
+impl ModulusResult {
+    fn numbered_from(mut self, first: usize) -> Self {
+        let warnings = self.warnings.into_iter();
+        self.warnings = warnings
+            .map(|warning| warning.numbered_from(first))
+            .collect();
+        self
+    }
+}
+
+impl Measurement {
+    /// This measurement with frames and loads counted from `first` instead of 0, in its text and in
+    /// the messages of its errors and cautions.
+    ///
+    /// ```
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
+    /// let pipeline = trial.pipeline()?.with_control_points(60);
+    /// let measurement = trial.press(&pipeline)?.measure();
+    /// assert!(measurement.to_string().contains("\nframe 0 "));
+    /// assert!(measurement.numbered_from(1).to_string().contains("\nframe 2 "));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn numbered_from(mut self, first: usize) -> Self {
+        let error = |error: PipelineError| error.numbered_from(first);
+        let modulus = |modulus: ModulusResult| modulus.numbered_from(first);
+        let frame = |mut frame: FrameResult| {
+            frame.force_n = frame.force_n.map_err(error);
+            frame.surface_height_m = frame.surface_height_m.map_err(error);
+            frame
+        };
+        let frames = self.frames.into_iter();
+        self.youngs_modulus_pa = self.youngs_modulus_pa.map(modulus).map_err(error);
+        self.estimators = self.estimators.into_iter().map(modulus).collect();
+        self.frames = frames
+            .map(|found| found.map(frame).map_err(error))
+            .collect();
+        self.strain = self.strain.map_err(error);
+        self.matching = self.matching.map_err(error);
+        let flags = self.flags.into_iter();
+        self.flags = flags.map(|flag| flag.numbered_from(first)).collect();
+        self.first_frame += first;
+        self
+    }
 }
 
 impl Display for ModulusResult {
@@ -384,7 +434,7 @@ impl Display for Measurement {
             writeln!(f, "{:<16} {time}", "over time")?;
         }
         for (i, frame) in self.frames.iter().enumerate() {
-            line(f, &format!("frame {}", i + 1), frame)?;
+            line(f, &format!("frame {}", self.first_frame + i), frame)?;
         }
         line(f, "match", &self.matching)?;
         line(f, "strain", &self.strain)?;
@@ -419,16 +469,13 @@ impl Display for ContactReading {
         let [x, y] = self.centroid_px.map(|c| with_its_error(c, 1.0));
         write!(f, "   centroid ({x}, {y}) px")?;
         self.flags(0)
-            .try_for_each(|flag| match flag.to_string().strip_prefix("frame 1: ") {
-                Some(caution) => write!(f, "   [{caution}]"),
-                None => write!(f, "   [{flag}]"),
-            })
+            .try_for_each(|flag| write!(f, "   [{}]", flag.without_frame()))
     }
 }
 
 impl Display for Update {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        write!(f, "frame {}: ", self.frame + 1)?;
+        write!(f, "frame {}: ", self.frame)?;
         match &self.contact {
             Some(contact) => write!(f, "{contact}")?,
             None => f.write_str("no contact")?,

@@ -32,7 +32,7 @@ use std::sync::Arc;
 /// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
 /// let first: Update = session.push(trial.simulation.frames[1].view())?;
 /// assert_eq!((first.frame, first.shear), (0, None), "the stiffnesses are not known");
-/// assert!(first.to_string().starts_with("frame 1: force 1."));
+/// assert!(first.to_string().starts_with("frame 0: force 1."));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]

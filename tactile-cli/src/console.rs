@@ -126,16 +126,7 @@ impl Context {
     /// The cautions about a frame, one per line, below the name of the frame.
     pub(crate) fn warn_of_frame(&mut self, flags: &[Flag]) {
         for flag in flags {
-            let sentence = flag.to_string();
-            let words = sentence.split_once(": ").and_then(|(before, words)| {
-                let number = before.strip_prefix("frame ")?;
-                number.parse::<usize>().is_ok().then_some(words)
-            });
-            self.aside(format_args!(
-                "{:<18}{}",
-                "caution",
-                words.unwrap_or(&sentence)
-            ));
+            self.aside(format_args!("{:<18}{}", "caution", flag.without_frame()));
         }
         self.keep_cautions(flags);
     }
@@ -143,13 +134,11 @@ impl Context {
     /// Stores printed cautions for the JSON object. The first frame is frame 1.
     pub(crate) fn keep_cautions(&mut self, flags: &[Flag]) {
         for flag in flags {
+            let flag = &flag.clone().numbered_from(1);
             if let Some(report) = &mut self.outputs.report {
                 report.flag(flag);
             }
             let mut caution = serde_json::to_value(flag).unwrap_or_default();
-            if let Some(frame) = caution.get("frame").and_then(Value::as_u64) {
-                caution["frame"] = json!(frame + 1);
-            }
             caution["text"] = json!(flag.to_string());
             self.cautions.push(caution);
         }
@@ -202,47 +191,25 @@ impl Context {
         self.outputs.allow(bytes, job, remedy)
     }
 
-    /// Runs a job that can neither be stopped nor report its progress, with the elapsed time on the
-    /// terminal. Returns `None` after Ctrl-C; the job then ends with the program.
-    pub(crate) fn wait<R: Send + 'static>(
+    /// For computations that stop after Ctrl-C.
+    pub(crate) fn watch(&self) -> impl Fn() -> ControlFlow<()> + Send + Sync + 'static {
+        let interrupt = self.interrupt.clone();
+        move || interrupt.flow()
+    }
+
+    /// Runs a job that checks for Ctrl-C itself, many times a second, with the elapsed time on the
+    /// terminal. Returns `None` after Ctrl-C.
+    pub(crate) fn wait<R>(
         &self,
         job: impl Into<String>,
-        work: impl FnOnce() -> R + Send + 'static,
+        work: impl FnOnce(&Interrupt) -> R,
     ) -> Option<R> {
         let _clock = Bar::clock(job);
-        let (answer, answered) = mpsc::channel();
         self.interrupt.polled(true);
-        // The library cannot stop this computation: it runs in a separate thread while this one
-        // waits for Ctrl-C.
-        let work = Arc::new(Mutex::new(Some(work)));
-        let job = Arc::clone(&work);
-        let take = |job: &Mutex<Option<_>>| job.lock().ok().and_then(|mut job| job.take());
-        let worker = std::thread::Builder::new().spawn(move || {
-            if let Some(work) = take(&job) {
-                // After Ctrl-C the result is no longer needed.
-                let _ = answer.send(work());
-            }
-        });
-        let Ok(worker) = worker else {
-            // The system allows no more threads: the computation runs here, and Ctrl-C ends the
-            // program.
-            self.interrupt.polled(false);
-            return take(&work).map(|work| work());
-        };
-        let result = loop {
-            match answered.recv_timeout(Duration::from_millis(100)) {
-                Ok(result) => break Some(result),
-                Err(mpsc::RecvTimeoutError::Timeout) if self.interrupt.requested() => break None,
-                Err(mpsc::RecvTimeoutError::Timeout) => {}
-                Err(mpsc::RecvTimeoutError::Disconnected) => match worker.join() {
-                    Err(panic) => std::panic::resume_unwind(panic),
-                    Ok(()) => break None,
-                },
-            }
-        };
+        let result = work(&self.interrupt);
         // The following work is short or checks for Ctrl-C itself.
         self.interrupt.polled(false);
-        result
+        (!self.interrupt.requested()).then_some(result)
     }
 
     /// Runs a search for inclusions with its progress. Ctrl-C stops it.

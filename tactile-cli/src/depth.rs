@@ -171,9 +171,11 @@ pub(crate) fn run(arguments: &DepthArguments, context: &mut Context) -> Result<E
     let mut values = Vec::new();
     for (k, NamedFrame { name, pixels, .. }) in images.iter().enumerate() {
         let reading = press.contact(k).map(|reading| reading.copied());
-        let reading = reading.map_err(|error| Failure::in_file(Path::new(name), error))?;
+        let reading =
+            reading.map_err(|error| Failure::in_file(Path::new(name), error.numbered_from(1)))?;
         let found = reading.map(|reading| {
-            let surface = press.surface(k).cloned().map_err(|e| e.to_string());
+            let surface = press.surface(k).cloned();
+            let surface = surface.map_err(|error| error.numbered_from(1).to_string());
             let ball = surface.as_ref().ok().and_then(|s| arguments.fitted(s));
             Found {
                 reading,

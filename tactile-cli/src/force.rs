@@ -87,6 +87,7 @@ pub(crate) fn run(arguments: &ForceArguments, context: &mut Context) -> Result<E
                 }
                 Err(error) => {
                     exit = Exit::Partial;
+                    let error = error.numbered_from(1);
                     context.line(format_args!("no answer: {error}"));
                     values.push(json!({ "frame": name, "error": error.to_string() }));
                 }

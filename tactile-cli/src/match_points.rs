@@ -266,10 +266,11 @@ fn solve<const D: usize>(
     let job = format!("matching {name}: {points} points to {targets}");
     let repetition = arguments.repetition;
     let (method, expectations) = (arguments.method, arguments.expectations);
-    let interrupt = context.interrupt.clone();
-    let answer = context.wait(job, move || {
+    let answer = context.wait(job, |interrupt| {
         let matcher = method.matcher(expectations);
-        repetition.timed(&interrupt, || matcher.match_points(&model, &target))
+        repetition.timed(interrupt, || {
+            matcher.match_watched(&model, &target, &mut || interrupt.flow())
+        })
     })?;
     let (matching, ms) = match answer {
         Ok(answer) => answer,

@@ -155,7 +155,7 @@ impl Frames {
     /// The error of the pipeline, with file and field if there is a scene file.
     fn explain(&self, error: PipelineError) -> String {
         match self {
-            Self::Simulated(_) => error.to_string(),
+            Self::Simulated(_) => error.numbered_from(1).to_string(),
             Self::Scene(own) => own.0.measure_error(error).to_string(),
         }
     }
@@ -252,14 +252,18 @@ pub(crate) fn run(arguments: &MeasureArguments, context: &mut Context) -> Result
         print_contacts(&contacts, context);
         return Ok(Exit::Interrupted);
     }
-    let mut measurement = press.measure();
+    let measurement = press.measure();
+    let cautions = measurement.flags.clone();
+    let failure = measurement.youngs_modulus_pa.as_ref().err().cloned();
+    // Here frames are counted from 1.
+    let mut measurement = measurement.numbered_from(1);
     let timing = timing(&press, arguments.repetition.repeat, context);
     let truth = frames.truth();
     print(&measurement, truth, &timing, context);
-    if let Err(error) = &measurement.youngs_modulus_pa {
-        context.note(frames.explain(error.clone()));
+    if let Some(error) = failure {
+        context.note(frames.explain(error));
     }
-    context.keep_cautions(&measurement.flags);
+    context.keep_cautions(&cautions);
     // The cautions are separate from the measurement, as in every result.
     let flags = std::mem::take(&mut measurement.flags);
     context.value(&Answer {
@@ -309,7 +313,7 @@ pub(crate) fn run(arguments: &MeasureArguments, context: &mut Context) -> Result
             Ok(Exit::complete_if(complete))
         }
         Err(PlotError::Measure(error)) => {
-            context.note(format_args!("no plots: {error}"));
+            context.note(format_args!("no plots: {}", error.numbered_from(1)));
             Ok(Exit::Partial)
         }
         Err(error) => Err(Failure::output(error)),
@@ -327,7 +331,8 @@ fn contacts(press: &mut Press<'_>, context: &mut Context) -> Option<Vec<Contact>
             print_contacts(&contacts, context);
             return None;
         }
-        contacts.push(press.contact(frame).map(|contact| contact.copied()));
+        let contact = press.contact(frame).map(|contact| contact.copied());
+        contacts.push(contact.map_err(|error| error.numbered_from(1)));
         bar.done(frame + 1);
     }
     Some(contacts)

@@ -1,5 +1,5 @@
 //! `tactile strain`: strain between two sets of points, before and after a deformation.
-use self::grid::{Known, StrainGrid, arrays};
+use self::grid::{Known, arrays};
 use crate::arguments::{PointFrame, PointFrames, TableArguments};
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
@@ -19,7 +19,7 @@ use tactile_imaging::elasticity::strain::{
 use tactile_imaging::force::Estimate;
 use tactile_imaging::matching::PointMatcher;
 use tactile_imaging::pipeline::with_error;
-use tactile_imaging::{StrainAt, StrainBetween, StrainBetweenOptions};
+use tactile_imaging::{PointGrid, StrainAt, StrainBetween, StrainBetweenOptions};
 
 mod grid;
 mod quantities;
@@ -235,25 +235,27 @@ fn answer<const D: usize>(
     context.outputs.add(FILES[2], report.arrays(strain, &read)?);
     context.outputs.page(FILES[3], || report.page(strain))?;
     if let Some(spacing) = arguments.grid {
-        let grid = StrainGrid::over(&report.before, spacing)?;
-        let (strain, points) = (strain.clone(), grid.points());
-        let measure_of_grid = arguments.measure.strain();
+        let grid = PointGrid::over(&report.before, spacing)
+            .map_err(|error| Failure::input(format!("--grid {spacing}: {}", error.expected)))?;
+        let (points, measure) = (grid.points(), arguments.measure.strain());
         let job = format!("strain at {} points of the grid", points.len());
-        let evaluate = move || {
-            let read = strain.kinematics_at(&points, &*measure_of_grid);
-            (strain.at(&points, &*measure_of_grid), read)
-        };
-        let Some((found, read)) = context.wait(job, evaluate) else {
+        let evaluated = context.wait(job, |interrupt| {
+            strain.at_watched(&points, &*measure, || interrupt.flow())
+        });
+        let Some(evaluated) = evaluated else {
             return Ok(Exit::Interrupted);
         };
-        let found = found.map_err(|error| Failure::input(error.to_string()))?;
+        let found = evaluated.map_err(|error| Failure::input(error.to_string()))?;
+        let read: Vec<_> = found.iter().map(|at| at.kinematics(&*measure)).collect();
         let known = |at: &StrainAt<D>| (at.displacement, at.strain, at.standard_error);
         let found: Vec<Known<D>> = found.iter().map(known).collect();
         let shape: Vec<usize> = grid.counts.iter().rev().copied().collect();
         let table = report.grid_table(&grid, &found, &read);
         let arrays = arrays(Npz::new(), &shape, &grid.points(), &found, &read)?;
         context.outputs.add(GRID_FILES[0], table);
-        context.outputs.add(GRID_FILES[1], grid.vtk(&found, &read));
+        context
+            .outputs
+            .add(GRID_FILES[1], grid::vtk(&grid, &found, &read));
         context.outputs.add(GRID_FILES[2], arrays);
     }
     Ok(Exit::complete_if(report.complete))
@@ -301,8 +303,10 @@ fn between<const D: usize>(
     } else {
         let matcher = arguments.expectations.matcher();
         let job = format!("matching {} to {} points", before.len(), after.len());
-        let sets = (before.clone(), after.clone());
-        let Some(found) = context.wait(job, move || matcher.match_points(&sets.0, &sets.1)) else {
+        let found = context.wait(job, |interrupt| {
+            matcher.match_watched(&before, &after, &mut || interrupt.flow())
+        });
+        let Some(found) = found else {
             return Ok(None);
         };
         let found = found.map_err(|error| {
@@ -323,12 +327,12 @@ fn between<const D: usize>(
         );
     }
     let job = format!("fitting {} pairs", matched.len());
-    let (from, to, options) = (before.clone(), after.clone(), arguments.options());
+    let options = arguments.options().with_watch(context.watch());
     // Ctrl-C during the fit keeps the pairs, which took longest to find.
-    let found = context.wait(job, move || {
+    let found = context.wait(job, |_| {
         let found = match &matching {
-            Some(matching) => StrainBetween::of_matching(&from, &to, matching, &options),
-            None => StrainBetween::of_known_pairs(&from, &to, &options),
+            Some(matching) => StrainBetween::of_matching(&before, &after, matching, &options),
+            None => StrainBetween::of_known_pairs(&before, &after, &options),
         };
         found.map_err(|error| error.to_string())
     });
@@ -554,7 +558,7 @@ impl<const D: usize> StrainReport<D> {
     /// Displacement, strain and its standard error on the grid.
     fn grid_table(
         &self,
-        grid: &StrainGrid<D>,
+        grid: &PointGrid<D>,
         found: &[Known<D>],
         read: &[StrainQuantities],
     ) -> Vec<u8> {

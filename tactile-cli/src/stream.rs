@@ -203,7 +203,8 @@ impl Meter for Live {
                            youngs_modulus_Pa,youngs_modulus_error_Pa,strain_xx,strain_zz";
 
     fn measure(&mut self, frame: &Array2<u8>) -> Result<Row, Box<dyn Error>> {
-        let contact = self.session.push(frame.view())?.contact;
+        let pushed = self.session.push(frame.view());
+        let contact = pushed.map_err(|error| error.numbered_from(1))?.contact;
         let force = contact.and_then(|c| c.force_n).map(|force| force.total());
         let least = self.strained_above_n;
         let strained = least.is_some_and(|least| force.is_some_and(|f| f.value > least));
@@ -258,7 +259,8 @@ impl Meter for Live {
     }
 
     fn shown(&self, row: &Row, columns: f64) -> Value {
-        let cautions: Vec<String> = self.cautions.iter().map(ToString::to_string).collect();
+        let cautions = self.cautions.iter().map(in_words);
+        let cautions: Vec<_> = cautions.collect();
         let of = |e: Estimate| [e.value, e.standard_error];
         json!({
             "cautions": cautions, "force_n": row.force_n.map(of),
@@ -280,6 +282,11 @@ impl Meter for Live {
         let relief = HeightGrid::of(known_heights_mm(found).view(), size);
         json!({ "name": name, "relief": relief })
     }
+}
+
+/// A caution with its frame counted from 1.
+fn in_words(caution: &Flag) -> String {
+    caution.clone().numbered_from(1).to_string()
 }
 
 /// Prints the results of the whole series, which is simulated if the true modulus is known, and
@@ -307,6 +314,7 @@ fn finish(
             json!(Modulus::from(m))
         }
         Err(reason) => {
+            let reason = reason.clone().numbered_from(1);
             context.answer("modulus", format_args!("none: {reason}"));
             json!({ "error": reason.to_string() })
         }
@@ -322,7 +330,7 @@ fn finish(
         cautions.extend(flags);
     }
     for caution in &*cautions {
-        context.aside(format_args!("{:<18}{caution}", "caution"));
+        context.aside(format_args!("{:<18}{}", "caution", in_words(caution)));
     }
     context.keep_cautions(cautions);
     let mut value = live.value();

@@ -63,7 +63,7 @@ pub enum ElasticityError {
         lower_bound_pa: Option<f64>,
     },
     /// The contact of a load is outside the range of the law, and no other load is within it.
-    #[error("load {}: the contact is outside the range of the law", load + 1)]
+    #[error("load {load}: the contact is outside the range of the law")]
     BeyondLaw {
         /// Index of the load.
         load: usize,
@@ -195,6 +195,24 @@ pub enum ElasticityError {
 }
 
 impl ElasticityError {
+    /// This error with its load counted from `first` instead of 0, for messages.
+    ///
+    /// ```
+    /// use tactile_elasticity::ElasticityError;
+    /// let error = ElasticityError::BeyondLaw { load: 2 }.numbered_from(1);
+    /// assert!(error.to_string().starts_with("load 3: "));
+    /// ```
+    #[must_use]
+    pub fn numbered_from(mut self, first: usize) -> Self {
+        match &mut self {
+            Self::BeyondLaw { load }
+            | Self::TimeDecreases { load, .. }
+            | Self::Missing { load, .. } => *load += first,
+            _ => {}
+        }
+        self
+    }
+
     /// Wraps the error of a user-defined estimator, law or measure.
     ///
     /// ```

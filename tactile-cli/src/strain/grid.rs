@@ -3,87 +3,49 @@ use super::quantities;
 use crate::failure::Failure;
 use crate::outputs::Npz;
 use nalgebra::{Matrix3, Point, SVector};
+use tactile_imaging::PointGrid;
 use tactile_imaging::elasticity::kinematics::StrainQuantities;
 
-/// Equally spaced points in a box, with x running fastest.
-pub(super) struct StrainGrid<const D: usize> {
-    origin: Point<f64, D>,
-    spacing: f64,
-    pub counts: [usize; D],
-}
-
-impl<const D: usize> StrainGrid<D> {
-    pub(super) fn over(points: &[Point<f64, D>], spacing: f64) -> Result<Self, Failure> {
-        let mut points = points.iter().filter(|p| p.iter().all(|x| x.is_finite()));
-        let start = points.next().copied().unwrap_or_else(Point::origin);
-        let (mut low, mut high) = (start, start);
-        for p in points {
-            (low, high) = (low.inf(p), high.sup(p));
-        }
-        let count = |a: usize| ((high[a] - low[a]) / spacing).floor() + 1.0;
-        // The files need some 300 bytes per point.
-        if (0..D).map(count).product::<f64>() > 4e6 {
-            return Err(Failure::input(format!(
-                "--grid {spacing} gives more than four million points: give a larger spacing"
-            )));
-        }
-        Ok(Self {
-            origin: low,
-            spacing,
-            counts: std::array::from_fn(|a| count(a) as usize),
-        })
-    }
-
-    pub(super) fn points(&self) -> Vec<Point<f64, D>> {
-        let place = |k: usize| {
-            let mut rest = k;
-            let mut place = self.origin;
-            for a in 0..D {
-                place[a] += self.spacing * (rest % self.counts[a]) as f64;
-                rest /= self.counts[a];
-            }
-            place
-        };
-        (0..self.counts.iter().product()).map(place).collect()
-    }
-
-    /// The legacy format of VTK, as text.
-    pub(super) fn vtk(&self, found: &[Known<D>], read: &[StrainQuantities]) -> Vec<u8> {
-        let three = |v: &[f64]| {
-            let at = |a: usize| v.get(a).copied().unwrap_or(0.0);
-            format!("{:e} {:e} {:e}", at(0), at(1), at(2))
-        };
-        let counts: Vec<f64> = self.counts.iter().map(|&c| c as f64).collect();
-        let depth = if D == 2 { 1.0 } else { counts[D - 1] };
-        let mut text = format!(
-            "# vtk DataFile Version 3.0\ndisplacement and strain\nASCII\nDATASET \
+/// The fields of a grid in the legacy format of VTK, as text.
+pub(super) fn vtk<const D: usize>(
+    grid: &PointGrid<D>,
+    found: &[Known<D>],
+    read: &[StrainQuantities],
+) -> Vec<u8> {
+    let three = |v: &[f64]| {
+        let at = |a: usize| v.get(a).copied().unwrap_or(0.0);
+        format!("{:e} {:e} {:e}", at(0), at(1), at(2))
+    };
+    let counts: Vec<f64> = grid.counts.iter().map(|&c| c as f64).collect();
+    let depth = if D == 2 { 1.0 } else { counts[D - 1] };
+    let mut text = format!(
+        "# vtk DataFile Version 3.0\ndisplacement and strain\nASCII\nDATASET \
              STRUCTURED_POINTS\nDIMENSIONS {} {} {depth}\nORIGIN {}\nSPACING {}\nPOINT_DATA {}\n",
-            counts[0],
-            counts[1],
-            three(self.origin.coords.as_slice()),
-            three(&[self.spacing; 3]),
-            found.len()
-        );
-        text.push_str("VECTORS displacement double\n");
-        for (displacement, ..) in found {
-            text.push_str(&three(displacement.as_slice()));
-            text.push('\n');
-        }
-        let strains: Vec<_> = found.iter().map(|at| at.1).collect();
-        let errors: Vec<_> = found.iter().map(|at| at.2).collect();
-        for (name, tensors) in [("strain", strains), ("standard_error", errors)] {
-            text.push_str(&format!("TENSORS {name} double\n"));
-            for tensor in tensors {
-                // The tensors are symmetric, so that columns equal rows.
-                for column in tensor.column_iter() {
-                    text.push_str(&three(&[column[0], column[1], column[2]]));
-                    text.push('\n');
-                }
+        counts[0],
+        counts[1],
+        three(grid.origin.coords.as_slice()),
+        three(&[grid.spacing; 3]),
+        found.len()
+    );
+    text.push_str("VECTORS displacement double\n");
+    for (displacement, ..) in found {
+        text.push_str(&three(displacement.as_slice()));
+        text.push('\n');
+    }
+    let strains: Vec<_> = found.iter().map(|at| at.1).collect();
+    let errors: Vec<_> = found.iter().map(|at| at.2).collect();
+    for (name, tensors) in [("strain", strains), ("standard_error", errors)] {
+        text.push_str(&format!("TENSORS {name} double\n"));
+        for tensor in tensors {
+            // The tensors are symmetric, so that columns equal rows.
+            for column in tensor.column_iter() {
+                text.push_str(&three(&[column[0], column[1], column[2]]));
+                text.push('\n');
             }
         }
-        quantities::vtk::<D>(&mut text, read);
-        text.into_bytes()
     }
+    quantities::vtk::<D>(&mut text, read);
+    text.into_bytes()
 }
 
 /// Displacement, strain and its standard error at a point.

@@ -19,7 +19,8 @@ pub(super) fn follow<const D: usize>(
     context: &mut Context,
 ) -> Option<StrainReport<D>> {
     let first = &frames[0];
-    let mut series = StrainSeries::new(&first.points, arguments.options());
+    let options = arguments.options().with_watch(context.watch());
+    let mut series = StrainSeries::new(&first.points, options);
     let mut report = SeriesReport::<D>::new(first.number);
     // The series contains the frames that were not refused.
     let mut followed = vec![first];
@@ -28,10 +29,9 @@ pub(super) fn follow<const D: usize>(
         ..StrainReport::new(unit, arguments)
     };
     for frame in &frames[1..] {
-        let points = frame.points.clone();
+        let points = &frame.points;
         let job = format!("following {} points to {}", points.len(), frame.name);
-        let found;
-        (found, series) = context.wait(job, move || (series.push(&points), series))?;
+        let found = context.wait(job, |_| series.push(points))?;
         let total = found
             .as_ref()
             .map_or_else(Err, |found| found.total.as_ref());

@@ -92,6 +92,27 @@ pub enum Warning {
 impl Warning {
     /// Ratio of moduli from which a sample is [unlike](Self::UnlikeGuide) its guide.
     pub const UNLIKE_GUIDE: f64 = 10.0;
+
+    /// This caution with its load counted from `first` instead of 0, for messages.
+    ///
+    /// ```
+    /// use tactile_elasticity::modulus::Warning;
+    /// let caution = Warning::OutOfReach { load: 2 };
+    /// assert!(caution.to_string().starts_with("load 2: "));
+    /// assert!(caution.numbered_from(1).to_string().starts_with("load 3: "));
+    /// ```
+    #[must_use]
+    pub fn numbered_from(mut self, first: usize) -> Self {
+        match &mut self {
+            Self::LargeContact { load, .. }
+            | Self::ThinLayer { load, .. }
+            | Self::LargeStrain { load, .. }
+            | Self::RatioOnSphere { load, .. }
+            | Self::OutOfReach { load } => *load += first,
+            _ => {}
+        }
+        self
+    }
 }
 
 impl core::fmt::Display for Warning {
@@ -99,15 +120,13 @@ impl core::fmt::Display for Warning {
         match self {
             Self::LargeContact { load, ratio, limit } => write!(
                 f,
-                "load {}: a/R = {ratio:.3} is above {limit:.2}, \
-                     small-contact theory is not valid",
-                load + 1
+                "load {load}: a/R = {ratio:.3} is above {limit:.2}, \
+                     small-contact theory is not valid"
             ),
             Self::ThinLayer { load, ratio, limit } => write!(
                 f,
-                "load {}: contact over layer thickness = {ratio:.3} \
-                     is above the limit {limit:.2} of this law",
-                load + 1
+                "load {load}: contact over layer thickness = {ratio:.3} \
+                     is above the limit {limit:.2} of this law"
             ),
             Self::LargeStrain {
                 load,
@@ -115,9 +134,8 @@ impl core::fmt::Display for Warning {
                 limit,
             } => write!(
                 f,
-                "load {}: strain {strain:.3} is above {limit:.2}, \
-                     the linear law is not valid",
-                load + 1
+                "load {load}: strain {strain:.3} is above {limit:.2}, \
+                     the linear law is not valid"
             ),
             Self::ExcessScatter {
                 reduced_chi_squared,
@@ -140,8 +158,7 @@ impl core::fmt::Display for Warning {
             ),
             Self::RatioOnSphere { load, ratio } => write!(
                 f,
-                "load {}: stress over strain is biased on a sphere (a/R = {ratio:.3})",
-                load + 1
+                "load {load}: stress over strain is biased on a sphere (a/R = {ratio:.3})"
             ),
             Self::UnlikeGuide { ratio } => {
                 let (times, word) = match *ratio < 1.0 {
@@ -156,8 +173,7 @@ impl core::fmt::Display for Warning {
             }
             Self::OutOfReach { load } => write!(
                 f,
-                "load {}: the contact is outside the range of the law and was not used",
-                load + 1
+                "load {load}: the contact is outside the range of the law and was not used"
             ),
             Self::GuideIgnored => write!(
                 f,

@@ -237,7 +237,7 @@ impl Scene {
             PipelineError::Check { press, reason } => {
                 FileError::field(&self.file, format!("check[{}]", press + 1), reason)
             }
-            error => FileError::field(&self.file, "check", error),
+            error => FileError::field(&self.file, "check", error.numbered_from(1)),
         })
     }
 
@@ -349,7 +349,7 @@ impl Scene {
         })
     }
 
-    /// The error of a pipeline, with the field of the scene that caused it.
+    /// The pipeline's error with the field that it comes from. Entries are counted from 1.
     pub fn measure_error(&self, error: PipelineError) -> FileError {
         // The field that the user has to change, if the kind of error determines it.
         let field = match (&error, error.frame()) {
@@ -371,7 +371,7 @@ impl Scene {
             (PipelineError::Sensor(_), _) => "reference".into(),
             _ => "frames".into(),
         };
-        FileError::field(&self.file, field, error)
+        FileError::field(&self.file, field, error.numbered_from(1))
     }
 }
 

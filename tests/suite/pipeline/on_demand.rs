@@ -31,5 +31,5 @@ fn a_frame_that_can_no_longer_be_read_is_named() {
     let error = press.contact(0).unwrap_err();
     let reason = "the file is gone".to_owned();
     assert_eq!(error, PipelineError::Unreadable { frame: 0, reason });
-    assert_eq!(error.to_string(), "frame 1: the file is gone");
+    assert_eq!(error.to_string(), "frame 0: the file is gone");
 }

@@ -29,12 +29,12 @@ fn every_result_can_be_read_by_people_and_programs() {
     let mut session = Session::new(&pipeline, &[trial.simulation.reference.view()]).unwrap();
     let empty = trial.scene.reference(3);
     let update = session.push(empty.view()).unwrap();
-    assert_eq!(told(&update), "frame 1: no contact");
+    assert_eq!(told(&update), "frame 0: no contact");
     assert!(told(session.drift()).ends_with("1 frame without contact"));
     let update = session.push(trial.simulation.frames[0].view()).unwrap();
     let line = told(&update);
     assert!(
-        line.starts_with("frame 2: force 0.") && line.contains(" ± "),
+        line.starts_with("frame 1: force 0.") && line.contains(" ± "),
         "{line}"
     );
     assert!(told(&update.contact.unwrap()).contains(" mm   centroid ("));
