@@ -1,8 +1,10 @@
 //! Exceptions: by kind, with the message of the error and the Python exception that caused it.
-use pyo3::exceptions::{PyException, PyIndexError, PyOSError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyException, PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use std::error::Error;
 use std::ops::ControlFlow;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use tactile_files::io::FileError;
 use tactile_files::sensor::SensorError;
@@ -73,35 +75,10 @@ pub(crate) fn refused(error: impl Error + 'static) -> PyErr {
 }
 
 pub(crate) fn pipeline(error: PipelineError) -> PyErr {
-    let sentence = from_zero(&error.to_string());
-    caused(&error).unwrap_or_else(|| match (&error, error.kind()) {
-        (PipelineError::NoSuchFrame { .. }, _) => PyIndexError::new_err(sentence),
-        (_, PipelineErrorKind::Options | PipelineErrorKind::Input) => invalid(sentence),
-        _ => TactileError::new_err(sentence),
+    caused(&error).unwrap_or_else(|| match error.kind() {
+        PipelineErrorKind::Options | PipelineErrorKind::Input => invalid(error),
+        _ => TactileError::new_err(error.to_string()),
     })
-}
-
-/// A message of the library, which counts frames from one, with the frame numbers of the calls,
-/// which count from zero.
-pub(crate) fn from_zero(sentence: &str) -> String {
-    let mut after = "";
-    let words = sentence.split_inclusive(' ').map(|word| {
-        let digits = word.len() - word.trim_start_matches(|c: char| c.is_ascii_digit()).len();
-        let counts = matches!(after, "frame" | "Frame" | "frames" | "Frames");
-        let number = word[..digits]
-            .parse::<u64>()
-            .ok()
-            .filter(|n| counts && *n > 0);
-        // "frames 1 and 2".
-        if !(counts && (digits > 0 || word.trim() == "and")) {
-            after = word.trim_matches(|c: char| !c.is_alphabetic());
-        }
-        match number {
-            Some(number) => format!("{}{}", number - 1, &word[digits..]),
-            None => word.to_owned(),
-        }
-    });
-    words.collect()
 }
 
 pub(crate) fn strain_between(error: StrainBetweenError) -> PyErr {
@@ -127,6 +104,10 @@ pub(crate) fn sensor(error: SensorError) -> PyErr {
     }
 }
 
+/// Time between two checks for a signal: rare enough for negligible cost, and often enough for a
+/// user, who is answered within a tenth of a second.
+const BETWEEN_CHECKS: Duration = Duration::from_millis(40);
+
 /// Lets `KeyboardInterrupt` stop long computations: called at every step, it checks from time to time.
 pub(crate) struct Signals {
     looked: Instant,
@@ -143,9 +124,8 @@ impl Signals {
 
     /// Whether the computation continues.
     pub(crate) fn check(&mut self) -> ControlFlow<()> {
-        // Rare enough for negligible cost, and often enough for a user. A raised exception is kept
-        // until `finish`, however often `check` is called again.
-        if self.raised.is_none() && self.looked.elapsed() > Duration::from_millis(50) {
+        // A raised exception is kept until `finish`, however often `check` is called again.
+        if self.raised.is_none() && self.looked.elapsed() > BETWEEN_CHECKS {
             self.looked = Instant::now();
             self.raised = Python::attach(|py| py.check_signals().err());
         }
@@ -159,6 +139,24 @@ impl Signals {
         self.raised.take().map_or(Ok(()), Err)
     }
 
+    /// Runs a computation that cannot be stopped on a thread of its own. `None` after a signal: the
+    /// thread then computes to its end without effect.
+    pub(crate) fn beside<T: Send + 'static>(
+        &mut self,
+        work: impl Send + FnOnce() -> T + 'static,
+    ) -> Option<T> {
+        let (sender, receiver) = mpsc::channel();
+        // Nobody receives what is computed after a signal.
+        std::thread::spawn(move || sender.send(work()).is_ok());
+        loop {
+            match receiver.recv_timeout(BETWEEN_CHECKS) {
+                Ok(found) => return Some(found),
+                Err(RecvTimeoutError::Timeout) if self.check().is_continue() => {}
+                Err(_) => return None,
+            }
+        }
+    }
+
     /// Runs without the interpreter lock, until the end or a `KeyboardInterrupt`.
     pub(crate) fn during<T: Send>(
         py: Python<'_>,
@@ -168,5 +166,16 @@ impl Signals {
         let found = py.detach(|| work(&mut signals));
         signals.finish()?;
         Ok(found)
+    }
+}
+
+/// A check for a signal, for stages that other threads may run.
+pub(crate) fn watch_of(
+    signals: &Arc<Mutex<Signals>>,
+) -> impl Fn() -> ControlFlow<()> + Send + Sync + 'static {
+    let signals = Arc::clone(signals);
+    move || {
+        let mut signals = signals.lock().unwrap_or_else(|broken| broken.into_inner());
+        signals.check()
     }
 }

@@ -22,12 +22,9 @@ use tactile_imaging::matching::{
 };
 use tactile_imaging::pipeline::MatcherChoice;
 use tactile_imaging::{
-    StrainAt, StrainBetween as Strained, StrainBetweenError, StrainBetweenOptions, StrainSeries,
-    strain_between as strain_of_sets,
+    PointGrid, StrainAt, StrainBetween as Strained, StrainBetweenError, StrainBetweenOptions,
+    StrainSeries, strain_between as strain_of_sets,
 };
-
-/// Maximum number of points of a grid: 600 MB.
-const MOST_PLACES: f64 = 4e6;
 
 /// The matcher given by the caller: parsed once, created for the plane or for space.
 pub(crate) enum Matcher {
@@ -524,16 +521,10 @@ impl Work {
         py: Python<'_>,
         compute: impl Send + FnOnce(StrainBetweenOptions<D>) -> Result<T, StrainBetweenError>,
     ) -> PyResult<T> {
-        let asked = Arc::clone(&self.signals);
         let mut options = StrainBetweenOptions::<D>::default()
             .with_matcher(self.matcher.boxed::<D>())
             .with_measure(self.measure)
-            .with_watch(move || {
-                asked
-                    .lock()
-                    .unwrap_or_else(|broken| broken.into_inner())
-                    .check()
-            });
+            .with_watch(errors::watch_of(&self.signals));
         if self.with_doubtful_pairs {
             options = options.with_doubtful_pairs();
         }
@@ -555,13 +546,14 @@ impl Work {
     ) -> PyResult<StrainBetween> {
         let measure = Arc::clone(&self.measure);
         let [before, after] = sets.map(arrays::points::<D>);
+        let watch = errors::watch_of(&self.signals);
         let (counts, places) = grid.map_or(Ok(Default::default()), |grid| places(grid, &before))?;
         let (found, on_grid) = self.run(py, |options| {
             let found = match paired {
                 true => Strained::of_known_pairs(&before, &after, &options),
                 false => strain_of_sets(&before, &after, &options),
             }?;
-            let on_grid = found.at(&places, &*measure)?;
+            let on_grid = found.at_watched(&places, &*measure, watch)?;
             Ok((found, on_grid))
         })?;
         let grid = grid.map(|_| grid_result(py, counts, &places, &on_grid));
@@ -595,8 +587,8 @@ impl Work {
     }
 }
 
-/// The points of a grid of this spacing over the box of points, with the first axis fastest, and
-/// their numbers along the axes. No numbers if positions are given.
+/// The places of a grid of this spacing over the box of the points, and their numbers along the
+/// axes. No numbers if positions are given.
 fn places<const D: usize>(
     grid: &Bound<'_, PyAny>,
     points: &[Point<f64, D>],
@@ -605,27 +597,8 @@ fn places<const D: usize>(
         let places = arrays::columns::<D>("grid", grid)?;
         return Ok((Vec::new(), places.into_iter().map(Point::from).collect()));
     };
-    let mut finite = points.iter().filter(|p| p.iter().all(|x| x.is_finite()));
-    let start = finite.next().copied().unwrap_or_else(Point::origin);
-    let (low, high) = finite.fold((start, start), |(low, high), p| (low.inf(p), high.sup(p)));
-    let counts: [f64; D] = std::array::from_fn(|a| ((high[a] - low[a]) / spacing).floor() + 1.0);
-    if !(spacing > 0.0 && counts.iter().product::<f64>() <= MOST_PLACES) {
-        return Err(invalid(format!(
-            "grid must be a positive spacing that gives {MOST_PLACES:.0e} places at most, \
-             found {spacing}"
-        )));
-    }
-    let counts = counts.map(|count| count as usize);
-    let place = |mut k: usize| {
-        let mut place = low;
-        for a in 0..D {
-            place[a] += spacing * (k % counts[a]) as f64;
-            k /= counts[a];
-        }
-        place
-    };
-    let places = (0..counts.iter().product()).map(place).collect();
-    Ok((counts.to_vec(), places))
+    let grid = PointGrid::over(points, spacing).map_err(invalid)?;
+    Ok((grid.counts.to_vec(), grid.points()))
 }
 
 fn grid_result<const D: usize>(

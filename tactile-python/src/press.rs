@@ -5,8 +5,9 @@ use crate::matching::{answer, tensor_text};
 use crate::pipeline::Pipeline;
 use crate::results::{Contact, Estimate, Match, Modulus, Strain, Surface, ends, of_values};
 use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
-use pyo3::types::PyType;
+use pyo3::types::{PyList, PyType};
 use pyo3::{PyTraverseError, PyVisit};
 use std::path::PathBuf;
 use std::sync::{Mutex, RwLock};
@@ -24,8 +25,8 @@ type ValuesAndErrors<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>
 
 /// Frames at one or more loads. Every result is computed on demand and only once.
 ///
-/// Frames are counted from zero, also in messages, and from the end if negative; `press[i]` is a
-/// frame with its results. Threads may share a press. The interpreter lock is released during
+/// Frames and loads are counted from zero, also in messages, and frames from the end if negative;
+/// `press[i]` is a frame with its results. Threads may share a press. The interpreter lock is released during
 /// computations; a frame that another thread adds meanwhile waits.
 ///
 /// Parameters
@@ -61,6 +62,17 @@ impl Press {
             own,
             busy: Mutex::default(),
         }
+    }
+
+    /// The frame of an index. A negative index counts from the end.
+    fn nth(&self, py: Python<'_>, index: i64) -> PyResult<usize> {
+        let frames = self.__len__(py)?;
+        let from = if index < 0 { frames as i64 } else { 0 };
+        let frame = usize::try_from(from.saturating_add(index)).ok();
+        let missing = || format!("there is no frame {index}: the press has {frames}");
+        frame
+            .filter(|&frame| frame < frames)
+            .ok_or_else(|| PyIndexError::new_err(missing()))
     }
 
     /// Computes without the interpreter lock.
@@ -189,27 +201,23 @@ impl Press {
 
     /// The unchanged frame, (rows, columns) of uint8.
     fn image<'py>(&self, py: Python<'py>, frame: i64) -> PyResult<Bound<'py, PyArray2<u8>>> {
-        let image = self.ask(py, |press| {
-            Ok(press.image(nth(press, frame)?)?.into_owned())
-        })?;
+        let frame = self.nth(py, frame)?;
+        let image = self.ask(py, |press| Ok(press.image(frame)?.into_owned()))?;
         Ok(PyArray2::from_owned_array(py, image))
     }
 
     /// Force, radius and centroid of the contact in a frame, or None without contact.
     fn contact(&self, py: Python<'_>, frame: i64) -> PyResult<Option<Contact>> {
-        let found = self.ask(py, |press| {
-            let frame = nth(press, frame)?;
-            let reading = press.contact(frame)?.copied();
-            Ok(reading.map(|reading| (frame, reading)))
-        })?;
+        let frame = self.nth(py, frame)?;
+        let found = self.ask(py, |press| Ok(press.contact(frame)?.copied()))?;
         found
-            .map(|(frame, reading)| contact(py, frame, &reading))
+            .map(|reading| contact(py, frame, &reading))
             .transpose()
     }
 
     /// A frame with its results. A negative index counts from the end.
     fn __getitem__<'py>(slf: &Bound<'py, Self>, frame: i64) -> PyResult<Bound<'py, PyAny>> {
-        let number = slf.get().ask(slf.py(), |press| nth(press, frame))?;
+        let number = slf.get().nth(slf.py(), frame)?;
         of_values(slf.py(), "PressFrame", (slf, number))
     }
 
@@ -232,9 +240,8 @@ impl Press {
         frame: i64,
         distances: Vec<f64>,
     ) -> PyResult<Option<ValuesAndErrors<'py>>> {
-        let depths = self.ask(py, |press| {
-            press.guide_depression_m(nth(press, frame)?, &distances)
-        })?;
+        let frame = self.nth(py, frame)?;
+        let depths = self.ask(py, |press| press.guide_depression_m(frame, &distances))?;
         Ok(depths.map(|depths| {
             let values = depths.iter().map(|depth| depth.value);
             let errors = depths.iter().map(|depth| depth.standard_error);
@@ -247,7 +254,8 @@ impl Press {
 
     /// The reconstructed surface of a frame.
     fn surface(&self, py: Python<'_>, frame: i64) -> PyResult<Surface> {
-        let surface = self.ask(py, |press| press.surface(nth(press, frame)?).cloned())?;
+        let frame = self.nth(py, frame)?;
+        let surface = self.ask(py, |press| press.surface(frame).cloned())?;
         Ok(surface_result(py, surface))
     }
 
@@ -257,16 +265,15 @@ impl Press {
         py: Python<'py>,
         frame: i64,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let points = self.ask(py, |press| {
-            press.control_points(nth(press, frame)?).map(arrays::rows)
-        })?;
+        let frame = self.nth(py, frame)?;
+        let points = self.ask(py, |press| press.control_points(frame).map(arrays::rows))?;
         Ok(PyArray2::from_owned_array(py, points))
     }
 
     /// The match of the control points of the first frame with those of a frame.
     fn matching(&self, py: Python<'_>, frame: i64) -> PyResult<Match> {
+        let frame = self.nth(py, frame)?;
         self.ask(py, |press| {
-            let frame = nth(press, frame)?;
             let sets = [press.control_points(0)?, press.control_points(frame)?];
             let found = press.matching(frame)?;
             Ok(Python::attach(|py| answer(py, found, sets)))
@@ -275,7 +282,8 @@ impl Press {
 
     /// Mean strain between the first frame and a frame.
     fn strain(&self, py: Python<'_>, frame: i64) -> PyResult<Strain> {
-        let strain = self.ask(py, |press| press.strain(nth(press, frame)?).cloned())?;
+        let frame = self.nth(py, frame)?;
+        let strain = self.ask(py, |press| press.strain(frame).cloned())?;
         Ok(strain_result(py, &strain))
     }
 
@@ -295,12 +303,15 @@ impl Press {
         Ok(estimates.iter().map(modulus).collect())
     }
 
-    /// All results as a dictionary of plain values, equal to `tactile measure --json` (its
-    /// `cautions` are `flags` here). A missing result has its reason.
+    /// All results as a dictionary of plain values, `Measurement` for type checkers. They are those of
+    /// `tactile measure --json`, whose `cautions` are `flags` here, with frames counted from zero. A
+    /// missing result has its reason.
     fn measure<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let text = self.ask(py, |press| Ok(serde_json::to_string(&press.measure())))?;
         let text = text.map_err(errors::invalid)?;
-        py.import("json")?.call_method1("loads", (text,))
+        let found = py.import("json")?.call_method1("loads", (text,))?;
+        found.call_method1("setdefault", ("flags", PyList::empty(py)))?;
+        Ok(found)
     }
 
     /// All results as text, with the reasons of missing ones.
@@ -332,20 +343,6 @@ impl Press {
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         Ok(format!("Press({} frames)", self.__len__(py)?))
     }
-}
-
-/// The frame of an index. A negative index counts from the end.
-fn nth(press: &rust::Press<'static>, number: i64) -> Result<usize, PipelineError> {
-    let frames = press.frames();
-    let from = if number < 0 { frames as i64 } else { 0 };
-    let frame = usize::try_from(number + from)
-        .ok()
-        .filter(|&frame| frame < frames);
-    let missing = PipelineError::NoSuchFrame {
-        frame: number.unsigned_abs() as usize,
-        frames,
-    };
-    frame.ok_or(missing)
 }
 
 /// A press that owns its frames.
@@ -380,10 +377,7 @@ fn contact(py: Python<'_>, frame: usize, reading: &ContactReading) -> PyResult<C
         y: estimate(y)?,
         area: reading.area_m2,
         touches_edge: reading.touches_edge,
-        flags: reading
-            .flags(frame)
-            .map(|flag| errors::from_zero(&flag.to_string()))
-            .collect(),
+        flags: reading.flags(frame).map(|flag| flag.to_string()).collect(),
     })
 }
 
@@ -423,7 +417,7 @@ pub(crate) fn modulus(estimate: &ModulusEstimate) -> Modulus {
         flags: estimate
             .warnings
             .iter()
-            .map(|warning| errors::from_zero(&warning.to_string()))
+            .map(|warning| warning.to_string())
             .collect(),
     }
 }

@@ -1,6 +1,6 @@
 //! Frozen results with fields, a sentence, a table for notebooks, and a dictionary.
 use crate::arrays::{self, Matrix, Tensors, Vector};
-use crate::errors::{failed, invalid};
+use crate::errors::{Signals, failed, invalid};
 use nalgebra::{Point, SMatrix, SVector};
 use ndarray::{Array2, ArrayView2};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
@@ -561,10 +561,11 @@ impl Match {
         let (sources, images) = (sources.map_err(invalid)?, images.map_err(invalid)?);
         arrays::dimension(["the model", "points"], [model, view])?;
         let noise = self.sigma;
-        let found = py.detach(|| match model.ncols() {
-            2 => moved::<2>([sources.view(), images.view(), view], matrix, noise),
-            _ => moved::<3>([sources.view(), images.view(), view], matrix, noise),
-        });
+        let sets = [sources.view(), images.view(), view];
+        let found = Signals::during(py, |signals| match model.ncols() {
+            2 => moved::<2>(sets, matrix, noise, signals),
+            _ => moved::<3>(sets, matrix, noise, signals),
+        })?;
         found.map_err(failed)
     }
 }
@@ -642,10 +643,12 @@ fn moved<const D: usize>(
     [sources, images, points]: [ArrayView2<'_, f64>; 3],
     matrix: Option<ArrayView2<'_, f64>>,
     noise: f64,
+    signals: &mut Signals,
 ) -> Result<(Array2<f64>, Vec<f64>), TpsError> {
     let [sources, images, points] = [sources, images, points].map(arrays::points::<D>);
     let Some(matrix) = matrix else {
-        let field = LocalField::fit(&sources, &images)?.at(&points);
+        let field = LocalField::fit_watched(&sources, &images, |_| signals.check())?;
+        let field = field.at_watched(&points, || signals.check())?;
         let places: Vec<_> = points
             .iter()
             .zip(&field)

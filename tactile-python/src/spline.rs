@@ -6,7 +6,9 @@ use ndarray::{Array2, Array3, ArrayView2, Axis};
 use numpy::{PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tactile_imaging::tps::{FitOptions, Kernel, NegR, Progress, R2LogR, R3, Smoothing, Spline};
+use tactile_imaging::tps::{
+    FitOptions, Kernel, NegR, Progress, R2LogR, R3, Smoothing, Spline, TpsError,
+};
 
 /// A spline of any kernel in the plane or in space. The first outputs are those of the caller, and
 /// the others are zero.
@@ -226,15 +228,22 @@ impl ThinPlateSpline {
     ) -> PyResult<Bound<'py, PyAny>> {
         let (points, mut shape) = self.queries(points)?;
         let view = points.as_array();
-        let jacobians = py.detach(|| {
-            let parts = self
-                .parts()
-                .map(|(part, outputs)| part.jacobians(view, outputs));
-            let parts: Vec<_> = parts.collect();
-            let views: Vec<_> = parts.iter().map(|part| part.view()).collect();
-            let all = ndarray::concatenate(Axis(1), &views).unwrap_or_default();
-            all.slice_axis(Axis(2), (..self.axes).into()).to_owned()
-        });
+        let jacobians = Signals::during(py, |signals| {
+            let mut jacobians = Array3::zeros((view.nrows(), self.outputs, self.axes));
+            let parts = jacobians.axis_chunks_iter_mut(Axis(0), AT_ONCE);
+            for (mut jacobians, places) in parts.zip(view.axis_chunks_iter(Axis(0), AT_ONCE)) {
+                if signals.check().is_break() {
+                    break;
+                }
+                for (k, (part, outputs)) in self.parts().enumerate() {
+                    let rows = LANES * k..LANES * k + outputs;
+                    let found = part.jacobians(places, outputs);
+                    let mut rows = jacobians.slice_axis_mut(Axis(1), rows.into());
+                    rows.assign(&found.slice_axis(Axis(2), (..self.axes).into()));
+                }
+            }
+            jacobians
+        })?;
         shape.extend([self.outputs, self.axes]);
         let jacobians = PyArray3::from_owned_array(py, jacobians).into_any();
         jacobians.call_method1("reshape", (shape,))
@@ -351,7 +360,15 @@ fn fit_to<const D: usize, const M: usize, K: Kernel + Send + Sync + 'static>(
     let targets: Vec<_> = (0..targets.nrows())
         .map(|row| Point::from(std::array::from_fn::<f64, M, _>(|k| target(row, k))))
         .collect();
-    let watch = |_: &Progress| signals.check();
-    let spline = Spline::<D, M, K>::fit_watched(&sources, &targets, &options, watch);
+    let spline = match smoothing {
+        // The decomposition of a large matrix cannot be stopped.
+        Smoothing::Gcv => signals
+            .beside(move || Spline::<D, M, K>::fit(&sources, &targets, &options))
+            .unwrap_or(Err(TpsError::Stopped)),
+        _ => {
+            let watch = |_: &Progress| signals.check();
+            Spline::fit_watched(&sources, &targets, &options, watch)
+        }
+    };
     Ok(Box::new(spline.map_err(invalid)?))
 }

@@ -105,11 +105,8 @@ fn heights(
             domain = domain.with_mask(mask.view());
         }
         let (mut workspace, mut surface) = (SurfaceWorkspace::default(), Surface::default());
-        let asked = Arc::clone(&signals);
-        workspace.on_progress(move |_| {
-            let mut signals = asked.lock().unwrap_or_else(|broken| broken.into_inner());
-            signals.check()
-        });
+        let watch = errors::watch_of(&signals);
+        workspace.on_progress(move |_| watch());
         method(&mut workspace, &domain, &mut surface)?;
         Ok(surface.heights)
     });

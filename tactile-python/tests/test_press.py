@@ -1,10 +1,13 @@
 """Presses and sessions: true values, results of the program, threads, memory."""
 
 import json
+import re
 import signal
 import subprocess
 import sys
 import threading
+import types
+import typing
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -41,6 +44,37 @@ def test_a_scene_file_has_the_bits_of_the_program():
     # Its report has times.
     del ours["report"]
     assert ours == {key: theirs[key] for key in ours}
+
+
+def assert_has_shape(value, kind):
+    """Compares a value with what a type checker reads of it."""
+    parts = typing.get_args(kind)
+    if typing.is_typeddict(kind):
+        assert kind.__required_keys__ <= set(value) <= set(kind.__annotations__), kind
+        for name, part in typing.get_type_hints(kind).items():
+            if name in value:
+                assert_has_shape(value[name], part)
+    elif isinstance(kind, types.UnionType):
+        fits = [part for part in parts if typing.is_typeddict(part) and isinstance(value, dict)]
+        chosen = [part for part in fits if ("error" in value) == ("error" in part.__annotations__)]
+        assert_has_shape(value, chosen[0] if chosen else next(part for part in parts if isinstance(value, typing.get_origin(part) or part)))
+    elif kind is not typing.Any:
+        origin = typing.get_origin(kind) or kind
+        assert isinstance(value, (float, int) if origin is float else origin), (value, kind)
+        if origin is list:
+            for entry in value:
+                assert_has_shape(entry, parts[0])
+
+
+def test_a_measurement_has_the_type_that_is_declared(scene):
+    press = ti.press_of(scene, control_points=60)
+    empty = ti.Press(ti.pipeline_of(scene), scene.reference)
+    empty.add_frame(scene.reference)
+    timed = ti.Press(ti.pipeline_of(scene), scene.reference)
+    for second, frame in enumerate([*scene.frames, *scene.frames]):
+        timed.add_frame(frame, time=second)
+    for measured in (press, empty, timed, ti.Press.from_scene(SCENE)):
+        assert_has_shape(measured.measure(), ti.Measurement)
 
 
 def test_a_press_has_contact_surface_points_and_strain(scene):
@@ -194,3 +228,27 @@ def test_presses_of_known_force_give_gain_and_layers(scene):
     with pytest.raises(ValueError, match="contradicts the stated layers"):
         pipeline.with_checks(reference, [softer])
     assert repr(weight) == "CheckPress.sample(1.3 N)"
+
+
+# What is cut from the example's scene for each row of the table in the documentation.
+LEFT_OUT = {
+    "nothing": None,
+    "`[[check]]`": r"^\[\[check\]\].*?(?=^\[)",
+    "`adhesion_error_j_per_m2`": r"^adhesion_error.*?\n",
+    "one of the `[[frames]]`": r"^\[\[frames\]\]\nimage = \"frame_1.*?\n",
+    "`[waveguide]`": r"^\[waveguide\]\n.*?\n",
+}
+
+
+@pytest.mark.parametrize("line", LEFT_OUT)
+def test_the_documentation_has_what_each_line_of_the_scene_buys(line, tmp_path):
+    page = (DATA.parents[1] / "docs" / "first_measurement.md").read_text(encoding="utf-8")
+    stated = re.search(rf"^\| {re.escape(line)} \| (\d+) to (\d+) kPa", page, re.MULTILINE).groups()
+    text = SCENE.read_text(encoding="utf-8")
+    if LEFT_OUT[line]:
+        text, found = re.subn(LEFT_OUT[line], "", text, count=1, flags=re.MULTILINE | re.DOTALL)
+        assert found
+    text = re.sub(r'"(\w+\.(?:png|csv))"', lambda name: json.dumps(str(SCENE.parent / name[1])), text)
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    low, high = ti.Press.from_scene(tmp_path / "scene.toml").modulus().interval_95
+    assert (round(1e-3 * low), round(1e-3 * high)) == tuple(map(int, stated))

@@ -131,8 +131,12 @@ def test_frames_have_the_same_numbers_in_calls_and_sentences(scene):
     number = press.add_frame(scene.reference)
     with pytest.raises(ti.TactileError, match=f"^frame {number} shows no contact"):
         press.surface(number)
-    with pytest.raises(IndexError, match="no frame 7: the press has 3"):
-        press.contact(7)
+    for index in (7, -4, 2**62, -(2**63)):
+        with pytest.raises(IndexError, match=f"no frame {index}: the press has 3"):
+            press.contact(index)
+    assert "\nframe 0 " in press.summary() and press.measure()["frames"][2]["error"].startswith(f"frame {number} ")
+    loads = ti.estimate_modulus([0.02, 0.9], [8e-4, 3e-3], ti.Object.sphere(3e-3), estimator="sphere")
+    assert any(flag.startswith("load 1: a/R") for flag in loads.flags)
 
 
 def test_one_saturated_frame_does_not_end_a_session(scene):

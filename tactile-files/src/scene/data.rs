@@ -349,7 +349,7 @@ impl Scene {
         })
     }
 
-    /// The pipeline's error with the field that it comes from. Entries are counted from 1.
+    /// The error of a pipeline, with the field of the scene that caused it. Both count from 1.
     pub fn measure_error(&self, error: PipelineError) -> FileError {
         // The field that the user has to change, if the kind of error determines it.
         let field = match (&error, error.frame()) {

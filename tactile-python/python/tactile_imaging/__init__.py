@@ -10,6 +10,7 @@ Units are SI. Images are arrays [row, column], frames of uint8. x is the column,
 to the object. (0, 0) is the centre of the first pixel.
 """
 
+from ._measurement import Measurement
 from ._native import (
     CheckPress,
     Contact,
@@ -67,6 +68,7 @@ __all__ = [
     "Load",
     "Markers",
     "Match",
+    "Measurement",
     "Modulus",
     "Object",
     "Pipeline",
