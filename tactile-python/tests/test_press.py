@@ -43,6 +43,10 @@ def test_a_scene_file_has_the_bits_of_the_program():
         assert caution.items() >= flag.items()
     # Its report has times.
     del ours["report"]
+    # The program counts loads from one.
+    for estimates in (ours["estimators"], theirs["estimators"]):
+        for estimate in estimates:
+            del estimate["warnings"]
     assert ours == {key: theirs[key] for key in ours}
 
 
