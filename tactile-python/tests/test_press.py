@@ -59,9 +59,11 @@ def assert_has_shape(value, kind):
             if name in value:
                 assert_has_shape(value[name], part)
     elif isinstance(kind, types.UnionType):
-        fits = [part for part in parts if typing.is_typeddict(part) and isinstance(value, dict)]
-        chosen = [part for part in fits if ("error" in value) == ("error" in part.__annotations__)]
-        assert_has_shape(value, chosen[0] if chosen else next(part for part in parts if isinstance(value, typing.get_origin(part) or part)))
+        kinds = [part for part in parts if typing.is_typeddict(part) == isinstance(value, dict)]
+        if isinstance(value, dict):
+            kinds = [part for part in kinds if ("error" in value) == ("error" in part.__annotations__)]
+        fits = [part for part in kinds if isinstance(value, dict) or isinstance(value, typing.get_origin(part) or part)]
+        assert_has_shape(value, fits[0])
     elif kind is not typing.Any:
         origin = typing.get_origin(kind) or kind
         assert isinstance(value, (float, int) if origin is float else origin), (value, kind)

@@ -135,7 +135,7 @@ def test_frames_have_the_same_numbers_in_calls_and_sentences(scene):
         with pytest.raises(IndexError, match=f"no frame {index}: the press has 3"):
             press.contact(index)
     assert "\nframe 0 " in press.summary() and press.measure()["frames"][2]["error"].startswith(f"frame {number} ")
-    loads = ti.estimate_modulus([0.02, 0.9], [8e-4, 3e-3], ti.Object.sphere(3e-3), estimator="sphere")
+    loads = ti.estimate_modulus([[0.02, 1e-4], [0.9, 1e-3]], [[8e-4, 1e-5], [3e-3, 1e-5]], ti.Object.sphere(3e-3), estimator="sphere")
     assert any(flag.startswith("load 1: a/R") for flag in loads.flags)
 
 
