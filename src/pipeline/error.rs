@@ -115,7 +115,7 @@ pub enum PipelineError {
         /// The frame.
         frame: usize,
     },
-    /// A frame shows no contact, but its signal has the opposite sign of a contact.
+    /// A frame shows no contact, but its signal has the wrong sign for one.
     #[error(
         "frame {frame} shows no contact, though it is up to {:.0} grey levels {} than the \
          reference: were the two swapped, or has the light changed?",

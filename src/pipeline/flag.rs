@@ -90,7 +90,7 @@ pub enum Flag {
         /// Standard error of the value.
         standard_error: f64,
     },
-    /// There is no contact, but the signal has the opposite sign of a contact.
+    /// There is no contact, but the signal has the wrong sign for one.
     #[error("{}", PipelineError::OppositeSignal { frame: *frame, grey: *grey })]
     OppositeSignal {
         /// The frame.

@@ -189,7 +189,7 @@ pub(crate) fn run(arguments: &MatchArguments, context: &mut Context) -> Result<E
     if arguments.method != Method::Softassign && expected {
         return Err(Failure::input(
             "--rotation, --outliers, --transformation and --largest-motion apply to the method \
-             softassign alone: leave out --method or them",
+             softassign alone: omit them, or omit --method",
         ));
     }
     let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_owned();

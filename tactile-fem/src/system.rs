@@ -76,7 +76,7 @@ pub(crate) struct Layout {
     pattern: Option<Arc<Pattern>>,
     /// Indices of each element in the pattern.
     places: Arc<[Places]>,
-    /// The last tangent, with which a nearby scene converges. Otherwise a new one is computed.
+    /// The last tangent, if a nearby scene converges with it. Otherwise a new one is computed.
     pub(crate) chord: Option<Arc<Chord>>,
 }
 

@@ -312,7 +312,7 @@ impl SeriesMemory {
         let state: Box<S> = kept.unwrap_or_default();
         match self.state.insert(state).downcast_mut() {
             Some(state) => state,
-            None => unreachable!("the state was put there as this type"),
+            None => unreachable!("the state is stored with this type"),
         }
     }
 }

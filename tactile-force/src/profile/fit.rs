@@ -349,8 +349,8 @@ impl HertzFitter {
             let r2 = ring.place[3] / n;
             let spread = (ring.r4 / n - r2 * r2).max(0.0);
             let level = level(&self.edge, shape, r2, spread);
-            // The variance is that at the fitted level. With that at the measured level, pixels
-            // dark by noise would get a higher weight.
+            // The variance is that at the fitted level. With the variance at the measured level,
+            // pixels that noise makes darker would get a higher weight.
             let weight = 1.0 / variance.at(level.value);
             e.add(ring, &level, weight, r2, spread);
         }

@@ -11,8 +11,8 @@ use tactile_core::statistics::quantile;
 
 // Among all differences `tⱼ − xᵢ` between a block of neighbours and the targets, those of correct
 // pairs cluster at one vector, the motion of the block. All others are distributed as evenly as the
-// targets. The first blocks search far; each further block searches near the prediction from its
-// neighbours, so that a field that moves points by many spacings is followed from block to block
+// targets. The first blocks search far; each later block searches near the prediction from its
+// neighbours. Motions of many spacings are thus followed from block to block
 // [as in image velocimetry: Scarano, *Iterative image deformation methods in PIV*, Meas. Sci.
 // Technol. 13 (2002)]. Among equal peaks, such as those of a lattice, the one of least motion is
 // taken.
