@@ -1,13 +1,13 @@
-//! Frames of gels lit in colours: calibration, contacts and tracked markers.
+//! Frames of gels: calibration, contacts and tracked markers.
 #![allow(missing_docs)]
 
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::Point2;
-use ndarray::{Array2, Array3};
+use ndarray::{Array2, Array3, Axis};
 use tactile_gel::simulate::{ColourGel, ElasticFace, HertzPress};
-use tactile_gel::{BallPress, GelSensor, Marker, MarkerField};
+use tactile_gel::{BallPress, DarkModel, GelSensor, Marker, MarkerField};
 
 /// A calibration of twenty presses: their frames and the frame without contact.
 fn presses(shape: [usize; 2]) -> (Array3<u8>, Vec<Array3<u8>>) {
@@ -32,14 +32,10 @@ fn presses(shape: [usize; 2]) -> (Array3<u8>, Vec<Array3<u8>>) {
 fn read(criterion: &mut Criterion) {
     for (name, shape) in [("320 x 240", [240, 320]), ("640 x 480", [480, 640])] {
         let (flat, frames) = presses(shape);
-        let presses = frames.iter().map(|frame| BallPress {
-            frame: frame.view(),
-            ball_radius_m: 2e-3,
-            circle_px: None,
-        });
+        let presses = frames.iter().map(|frame| BallPress::new(frame, 2e-3));
         let presses: Vec<_> = presses.collect();
         let calibrate = || {
-            GelSensor::calibrate(flat.view(), 5e-5, &presses)
+            GelSensor::calibrate(&flat, 5e-5, &presses)
                 .expect("presses")
                 .0
         };
@@ -49,7 +45,14 @@ fn read(criterion: &mut Criterion) {
         group.bench_function(format!("calibrate, {name}"), |b| b.iter(calibrate));
         group.sample_size(50);
         group.bench_function(format!("read, {name}"), |b| {
-            b.iter(|| sensor.read(black_box(frames[15].view())));
+            b.iter(|| sensor.read(black_box(&frames[15])));
+        });
+        let grey = |frame: &Array3<u8>| frame.index_axis(Axis(2), 0).to_owned();
+        let model = DarkModel::new(5e-5, vec![[0.0, 0.0], [100.0, 1e-3]]);
+        let dark = GelSensor::new(model, &grey(&flat)).expect("a table");
+        let frame = grey(&frames[15]);
+        group.bench_function(format!("read of a gel that darkens, {name}"), |b| {
+            b.iter(|| dark.read(black_box(&frame)));
         });
     }
 }

@@ -23,7 +23,7 @@ PICTURES = {
                             (0, "displacement", 0, "3. displacement and strain"), (0, "summary", 0, "4. modulus, beside the truth")]),
     "sensor": (["calibrate examples/data/sensor/calibration.toml"], [(0, "sensor", 0, ""), (0, "sensor", 1, "")]),
     "dark_gel": (["depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv --pixel-um 100 "
-                  "examples/data/dark_frame.pgm"], [(0, "dark_frame_depth", 0, "")]),
+                  "examples/data/dark_frame.pgm --ball"], [(0, "dark_frame_depth", 0, ""), (0, "dark_frame_depth", 1, "")]),
     "strain": (["strain examples/data/before.csv examples/data/after.csv"], [(0, "strain", 0, ""), (0, "strain", 3, "")]),
     "scan": (["inclusion examples/data/inclusion/scan.toml"], [(0, "inclusion", 2, ""), (0, "inclusion", 3, "")]),
     "gel": (["depth --sensor examples/data/colour/sensor.toml examples/data/colour/press_6.png"], [(0, "press_6_depth", 0, "")]),

@@ -3,7 +3,7 @@
 use crate::arguments::TableArguments;
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
-use crate::photometric;
+use crate::gel;
 use crate::plot::{Colour, Page, Panel};
 use crate::text::{digits, four_digits, in_unit};
 use clap::Args;
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use tactile_files::scene::doubt_of_pairs;
 use tactile_files::sensor::{
-    CalibratedSensor, Indenter, LayerFinding, PhotometricPresses, PressFinding, SensorCalibration,
+    CalibratedSensor, GelPresses, Indenter, LayerFinding, PressFinding, SensorCalibration,
     SensorError,
 };
 use tactile_imaging::force::{
@@ -27,10 +27,12 @@ use tactile_imaging::force::{
 /// to it sensor.svg, a report of which properties the presses determine and which they do not. If
 /// the frames cannot be used, no file is written.
 ///
-/// With kind = "photometric" the file lists presses of a ball on a gel lit in colours. It has a
-/// frame without contact, the pixel size, and for every press the radius of the ball and optionally
-/// its drawn contact circle. Wrong circles are reported. --out sensor.toml writes the sensor file
-/// for `tactile depth --sensor`, and the frame without contact next to it.
+/// With kind = "photometric" the file lists presses of a ball on a gel lit in colours, with kind =
+/// "darkening" on a gel that darkens where it is pressed. It has a frame without contact, the pixel
+/// size, and for every press the radius of the ball and optionally its drawn contact circle. Wrong
+/// circles are reported. A gel that darkens may have a table of darkness and depth instead of
+/// presses. --out sensor.toml writes the sensor file for `tactile depth --sensor`, and the frame
+/// without contact next to it.
 ///
 /// PAIRS.csv has the columns integrated_pixel_value (grey levels above the reference, summed over
 /// the contact) and force (N, mN, … according to its heading), in at least three rows. --out is a
@@ -220,8 +222,8 @@ fn calibrate_sensor(path: &Path, context: &mut Context) -> Result<Exit, Failure>
     } else {
         context.outputs.plan(&[""; 0], &[path])?;
     }
-    if PhotometricPresses::names_kind(path) {
-        return photometric::calibrate(path, &file, context);
+    if GelPresses::names_kind(path) {
+        return gel::calibrate(path, &file, context);
     }
     let failed = |error: SensorError| match error {
         // The error itself names its file.

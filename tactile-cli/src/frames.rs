@@ -10,6 +10,7 @@ use std::ffi::OsString;
 use std::mem::take;
 use std::path::{Path, PathBuf};
 use tactile_files::io::{FileError, FrameReader, Grey, image_colour, read_grey_image};
+use tactile_imaging::gel::GelImage;
 use tactile_imaging::pipeline::FrameSource;
 
 /// Frames per second if neither stream nor argument states them: the rate of the paper's camera.
@@ -27,6 +28,9 @@ pub(crate) trait Pixels: Default {
 
     /// The samples, `[row, column, channel]`.
     fn channels(&self) -> ArrayView3<'_, u8>;
+
+    /// For a gel sensor.
+    fn image(&self) -> GelImage<'_>;
 }
 
 impl Pixels for Array2<u8> {
@@ -43,6 +47,10 @@ impl Pixels for Array2<u8> {
     fn channels(&self) -> ArrayView3<'_, u8> {
         self.view().insert_axis(Axis(2))
     }
+
+    fn image(&self) -> GelImage<'_> {
+        self.into()
+    }
 }
 
 impl Pixels for Array3<u8> {
@@ -58,6 +66,10 @@ impl Pixels for Array3<u8> {
 
     fn channels(&self) -> ArrayView3<'_, u8> {
         self.view()
+    }
+
+    fn image(&self) -> GelImage<'_> {
+        self.into()
     }
 }
 
@@ -80,7 +92,7 @@ pub(crate) struct SensorFrames {
     pixel_um: [f64; 2],
     /// Bits of the camera, for 16-bit images whose file does not state them.
     #[arg(long, value_parser = clap::value_parser!(u8).range(8..=16))]
-    bits: Option<u8>,
+    pub bits: Option<u8>,
 }
 
 impl SensorFrames {

@@ -3,7 +3,7 @@ use crate::arguments::{Repetition, force_n};
 use crate::console::{Bar, Context};
 use crate::failure::{Exit, Failure};
 use crate::frames::{Colours, NamedFrame, Reading, frames_help};
-use crate::photometric;
+use crate::gel;
 use crate::plot::{PlotError, known_heights_mm, press_pages, summary_lines};
 use crate::simulation::{Physics, Simulation};
 use crate::text::in_unit;
@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use tactile_files::io::{Grey, image_colour, image_size};
 use tactile_files::scene::{Scene, SceneData, SceneFrame};
-use tactile_files::sensor::PhotometricPresses;
+use tactile_files::sensor::GelPresses;
 use tactile_imaging::Pipeline;
 use tactile_imaging::pipeline::{ContactReading, Measurement, PipelineError, Press, Stage};
 use tactile_simulate::{PressLoad, PressOptions, PressSimulation, PressTruth, Trial};
@@ -24,10 +24,10 @@ use tactile_simulate::{PressLoad, PressOptions, PressSimulation, PressTruth, Tri
 /// Without SCENE.toml it simulates the experiment of the paper: a ball of 3 mm radius pressed with
 /// 0.7 N and 1.2 N on the layered waveguide. It measures the simulated frames and prints every
 /// result with its true value. With SCENE.toml it measures the frames of a scene. With the sensor
-/// file of a gel lit in colours it prints depth, contact and force in every frame, and writes the
-/// files of `tactile depth --sensor`. --repeat N prints the median and the 99th centile of the
-/// times of every stage and of the whole. --out gets the plots: frames.svg, surfaces.svg,
-/// matches.svg, displacement.svg, strain.svg, summary.svg.
+/// file of a gel it prints depth, contact and force in every frame, and writes the files of
+/// `tactile depth --sensor`. --repeat N prints the median and the 99th centile of the times of every
+/// stage and of the whole. --out gets the plots: frames.svg, surfaces.svg, matches.svg,
+/// displacement.svg, strain.svg, summary.svg.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -226,9 +226,9 @@ pub(crate) fn run(arguments: &MeasureArguments, context: &mut Context) -> Result
     if let Some(sensor) = arguments
         .scene
         .as_deref()
-        .filter(|path| PhotometricPresses::names_kind(path))
+        .filter(|path| GelPresses::names_kind(path))
     {
-        return photometric::measure(sensor, &arguments.frames, context);
+        return gel::measure(sensor, &arguments.frames, context);
     }
     let stages = [
         "frames",

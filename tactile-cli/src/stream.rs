@@ -1,9 +1,9 @@
 //! `tactile stream`: force and modulus live, from a simulated series at camera rate or from
 //! recorded frames.
-mod coloured;
+mod gel;
 mod watch;
 
-use self::coloured::coloured;
+use self::gel::gel;
 pub(crate) use self::watch::listed;
 use self::watch::{Meter, Watch, watch};
 use crate::arguments::{force_n, not_negative, positive};
@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tactile_files::io::Grey;
 use tactile_files::scene::Scene;
-use tactile_files::sensor::PhotometricPresses;
+use tactile_files::sensor::GelPresses;
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
 use tactile_imaging::force::Estimate;
 use tactile_imaging::pipeline::{Flag, FrameSource, PipelineError, Session, with_error};
@@ -40,8 +40,8 @@ use tactile_simulate::{LoadCycle, PressLoad, PressOptions, Trial};
 /// the other, as fast as possible. A frame is then late if its measurement takes longer than the
 /// duration of a frame at --rate. --out gets stream.csv, with one row per frame. With --json each
 /// frame is a line when it is measured, and the last line is the whole result (JSON Lines). Instead
-/// of the scene, the sensor file of a gel lit in colours may be given with its frames, for
-/// force, contact and depth.
+/// of the scene, the sensor file of a gel may be given with its frames, for force, contact and
+/// depth.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -119,9 +119,7 @@ pub(crate) fn run(arguments: &StreamArguments, context: &mut Context) -> Result<
     let outputs = &mut context.outputs;
     outputs.plan(&["stream.csv"], arguments.scene.as_slice())?;
     match &arguments.scene {
-        Some(sensor) if PhotometricPresses::names_kind(sensor) => {
-            coloured(sensor, arguments, context)
-        }
+        Some(sensor) if GelPresses::names_kind(sensor) => gel(sensor, arguments, context),
         Some(scene) => recorded(scene, arguments, context),
         None => simulated(arguments, context),
     }

@@ -86,11 +86,9 @@ impl Unit {
             gel.frame(&face(layer).depth_px(shape, &[press]), seed + k)
         });
         let frames: Vec<_> = frames.collect();
-        let presses = frames.iter().map(|frame| BallPress {
-            frame: frame.view(),
-            ball_radius_m: BALL_PX * PIXEL_M,
-            circle_px: None,
-        });
+        let presses = frames
+            .iter()
+            .map(|frame| BallPress::new(frame, BALL_PX * PIXEL_M));
         let presses: Vec<_> = presses.collect();
         let reference = flat(&gel, seed + 90);
         let start = Instant::now();
@@ -169,7 +167,7 @@ fn exact(worlds: u64, seed: u64) {
         let face = face(unit.layer);
         let truth = face.depth_px(unit.gel.shape, &[press]);
         let frame = unit.gel.frame(&truth, seed + 11 * k);
-        let frame = unit.sensor.read(frame.view()).expect("its shape");
+        let frame = unit.sensor.read(&frame).expect("its shape");
         doubted += usize::from(!frame.doubts.is_empty());
         more += usize::from(frame.contacts.len() > 1);
         let start = format!(
@@ -227,7 +225,7 @@ fn frames(untouched: u64, seed: u64) {
     let unit = |k: u64| &units[(k % 5) as usize];
     let touched = (0..untouched).filter(|k| {
         let frame = flat(&unit(*k).gel, seed + 13 * k);
-        let found = unit(*k).sensor.read(frame.view()).expect("its shape");
+        let found = unit(*k).sensor.read(&frame).expect("its shape");
         !found.contacts.is_empty() || !found.doubts.is_empty()
     });
     println!(
@@ -243,7 +241,7 @@ fn frames(untouched: u64, seed: u64) {
             ..unit(k).gel.clone()
         };
         let frame = pressed(unit(k), &gel, seed + 19 * k);
-        let found = unit(k).sensor.read(frame.view()).expect("its shape");
+        let found = unit(k).sensor.read(&frame).expect("its shape");
         for doubt in found.doubts {
             *flagged.entry(doubt.kind().to_owned()).or_default() += 1;
         }
@@ -284,7 +282,7 @@ fn frames(untouched: u64, seed: u64) {
             ("another unit", pressed(other, &other.gel, seed + 29 * k)),
         ];
         for (name, frame) in wrong {
-            let found = this.sensor.read(frame.view()).expect("its shape");
+            let found = this.sensor.read(&frame).expect("its shape");
             let kinds: Vec<_> = found.doubts.iter().map(|doubt| doubt.kind()).collect();
             let word = if kinds.is_empty() {
                 "SILENT".into()
@@ -306,7 +304,7 @@ fn times(seed: u64) {
         let mut each: Vec<f64> = (0..200)
             .map(|_| {
                 let start = Instant::now();
-                let found = unit.sensor.read(frame.view()).expect("its shape");
+                let found = unit.sensor.read(&frame).expect("its shape");
                 assert!(!found.contacts.is_empty());
                 1e3 * start.elapsed().as_secs_f64()
             })

@@ -3,17 +3,17 @@
 
 use nalgebra::DMatrix;
 use ndarray::{Array2, ArrayView3};
-use tactile_core::Requirement;
 use tactile_core::statistics::quantile;
+use tactile_core::{InvalidOption, Requirement};
 
-use crate::GelError;
 use crate::ball::{BallFace, Evidence};
+use crate::colour::{ColourSensor, colour_image};
 use crate::error::same_shape;
 use crate::face::gradient_errors;
 use crate::frame_check::FrameDoubt;
 use crate::gradients::{Blurred, TERMS, samples};
-use crate::model::GelModel;
-use crate::sensor::{GelSensor, colour_image};
+use crate::model::ColourModel;
+use crate::{GelError, GelImage};
 
 /// Margin in pixels inside the edge of the contact, where the polynomial is not fitted: the blur of
 /// the frames mixes contact and free gel there.
@@ -35,12 +35,34 @@ const LARGE_BALL_M: f64 = 0.2;
 /// A frame of a ball pressed into the gel.
 #[derive(Clone, Copy, Debug)]
 pub struct BallPress<'a> {
-    /// The frame, `[row, column, channel]`.
-    pub frame: ArrayView3<'a, u8>,
+    /// The frame, of the kind of the reference.
+    pub frame: GelImage<'a>,
     /// Radius of the ball in metres.
     pub ball_radius_m: f64,
     /// Contact circle drawn by a user: x and y of the centre and radius, in pixels.
     pub circle_px: Option<[f64; 3]>,
+}
+
+impl<'a> BallPress<'a> {
+    /// A press of a ball without a drawn circle.
+    pub fn new(frame: impl Into<GelImage<'a>>, ball_radius_m: f64) -> Self {
+        Self {
+            frame: frame.into(),
+            ball_radius_m,
+            circle_px: None,
+        }
+    }
+
+    pub(crate) fn check(&self) -> Result<(), InvalidOption> {
+        Requirement::Positive.check("ball radius", self.ball_radius_m)?;
+        let Some([x, y, radius]) = self.circle_px else {
+            return Ok(());
+        };
+        Requirement::Finite.check("circle's x", x)?;
+        Requirement::Finite.check("circle's y", y)?;
+        Requirement::Positive.check("circle's radius", radius)?;
+        Ok(())
+    }
 }
 
 /// The contact circle of one press. Circles are x and y of the centre and radius, in pixels.
@@ -202,35 +224,15 @@ impl Sums {
     }
 }
 
-impl GelSensor {
-    /// Calibrates a sensor from its frame without contact and at least three presses of balls.
-    ///
-    /// Circles and polynomial are determined alternately until no circle changes by a tenth of a
-    /// pixel. The polynomial follows from the circles by ridge regression, and the circles from the
-    /// contacts in its normals. Without drawn circles, the start is the region of large colour
-    /// differences.
-    ///
-    /// A circle drawn by hand may be off by several pixels. The median offset between drawn and
-    /// found circles is the user's convention for the edge of a contact, and is kept. Apart from
-    /// this offset, the found circles are used. A drawn circle is wrong if it is off by more than
-    /// three times the median misfit and more than a tenth of the ball's radius.
-    ///
-    /// Errors come from leaving out one press at a time. They are the 68.3 % quantile of the
-    /// differences to the ball in the circle, which is the drawn one unless it is wrong. The common
-    /// error of all slopes comes from the scatter of the presses, by Student's distribution for few
-    /// presses.
-    ///
-    /// # Errors
-    /// [`GelError::TooFewPresses`], [`GelError::ShapeMismatch`], [`GelError::InvalidOption`] for
-    /// lengths that are not positive, [`GelError::OtherFrames`] if most presses do not come from
-    /// the sensor of the reference.
-    pub fn calibrate(
+impl ColourSensor {
+    /// Calibrates the sensor: see [`GelSensor::calibrate`](crate::GelSensor::calibrate).
+    pub(crate) fn calibrate(
         reference: ArrayView3<'_, u8>,
         pixel_size_m: f64,
         presses: &[BallPress<'_>],
     ) -> Result<(Self, CalibrationReport), GelError> {
         Requirement::Positive.check("pixel size", pixel_size_m)?;
-        let model = GelModel::new(pixel_size_m, [vec![0.0; TERMS], vec![0.0; TERMS]]);
+        let model = ColourModel::new(pixel_size_m, [vec![0.0; TERMS], vec![0.0; TERMS]]);
         let blank = Self::of_checked(model, colour_image(reference)?);
         let mut doubts = Vec::new();
         let mut read = Vec::new();
@@ -242,18 +244,7 @@ impl GelSensor {
             doubts.extend(other);
             read.push(press);
         }
-        let refused = doubts.iter().filter_map(|doubt| match doubt {
-            CalibrationDoubt::OtherFrame { doubt, .. } if doubt.refuses() => Some(*doubt),
-            _ => None,
-        });
-        let refused: Vec<FrameDoubt> = refused.collect();
-        if let (Some(doubt), true) = (refused.first(), 2 * refused.len() > presses.len()) {
-            return Err(GelError::OtherFrames {
-                presses: refused.len(),
-                given: presses.len(),
-                doubt: *doubt,
-            });
-        }
+        reject_others(&doubts, presses.len())?;
         doubts.extend(lengths(pixel_size_m, presses));
         let presses = read;
         let mut fit = Fitted::of(&blank, &presses, BallFace::Sphere)?;
@@ -270,7 +261,8 @@ impl GelSensor {
         let (model, median_angle_deg) = fit.judged(&blank, &presses)?;
         let sensor = blank.with_model(model);
         doubts.extend(verdict.factor.map(CalibrationDoubt::BallSize));
-        doubts.extend(fit.doubts(&presses, median_angle_deg));
+        let balls = presses.iter().map(|press| press.ball_px);
+        doubts.extend(self::doubts(balls, &fit.circles, median_angle_deg));
         let report = CalibrationReport {
             circles: fit.circles,
             offset_px: fit.offset_px,
@@ -282,7 +274,24 @@ impl GelSensor {
     }
 }
 
-fn lengths(pixel_size_m: f64, presses: &[BallPress<'_>]) -> Vec<CalibrationDoubt> {
+/// Rejects presses of which most do not come from the sensor of the reference.
+pub(crate) fn reject_others(doubts: &[CalibrationDoubt], given: usize) -> Result<(), GelError> {
+    let refused = doubts.iter().filter_map(|doubt| match doubt {
+        CalibrationDoubt::OtherFrame { doubt, .. } if doubt.refuses() => Some(*doubt),
+        _ => None,
+    });
+    let refused: Vec<FrameDoubt> = refused.collect();
+    match refused.first() {
+        Some(doubt) if 2 * refused.len() > given => Err(GelError::OtherFrames {
+            presses: refused.len(),
+            given,
+            doubt: *doubt,
+        }),
+        _ => Ok(()),
+    }
+}
+
+pub(crate) fn lengths(pixel_size_m: f64, presses: &[BallPress<'_>]) -> Vec<CalibrationDoubt> {
     let ball = presses.iter().map(|press| press.ball_radius_m);
     let ball = ball.fold(0.0, f64::max);
     let large = [(pixel_size_m, LARGE_PIXEL_M), (ball, LARGE_BALL_M)];
@@ -292,7 +301,7 @@ fn lengths(pixel_size_m: f64, presses: &[BallPress<'_>]) -> Vec<CalibrationDoubt
         .collect()
 }
 
-fn enough(available: usize) -> Result<(), GelError> {
+pub(crate) fn enough(available: usize) -> Result<(), GelError> {
     let needed = 3;
     if available < needed {
         return Err(GelError::TooFewPresses { needed, available });
@@ -310,7 +319,7 @@ struct Fitted {
 }
 
 impl Fitted {
-    fn of(blank: &GelSensor, presses: &[Press], face: BallFace) -> Result<Self, GelError> {
+    fn of(blank: &ColourSensor, presses: &[Press], face: BallFace) -> Result<Self, GelError> {
         let found = find_circles(blank, presses, face)?;
         let (circles, offset_px) = judged(presses, &found);
         let used = circles.iter().filter(|circle| circle.used_px.is_some());
@@ -333,7 +342,11 @@ impl Fitted {
 
     /// The model with its errors and the median angle in degrees, from leaving out one press at a
     /// time.
-    fn judged(&self, blank: &GelSensor, presses: &[Press]) -> Result<(GelModel, f64), GelError> {
+    fn judged(
+        &self,
+        blank: &ColourSensor,
+        presses: &[Press],
+    ) -> Result<(ColourModel, f64), GelError> {
         let pixel_size_m = blank.model.pixel_size_m;
         let mut misses = Misses::default();
         for ((press, circle), sums) in presses.iter().zip(&self.circles).zip(&self.sums) {
@@ -343,44 +356,50 @@ impl Fitted {
                 // The sums of the normal equations are additive over presses, so a press is left
                 // out by subtraction.
                 others.add(sums, -1.0);
-                let model = GelModel::new(pixel_size_m, others.solve()?);
+                let model = ColourModel::new(pixel_size_m, others.solve()?);
                 let without = blank.with_model(model);
                 misses.add(&without, press, press.within(circle), self.face)?;
             }
         }
         let angle = quantile(&mut misses.angles, 0.5);
-        let model = GelModel {
+        let model = ColourModel {
             normal_standard_error: quantile(&mut misses.gradients, 0.683),
             depth_standard_error_m: quantile(&mut misses.depths, 0.683),
             slope_standard_error: scatter(&misses.scales),
-            ..GelModel::new(pixel_size_m, self.total.solve()?)
+            ..ColourModel::new(pixel_size_m, self.total.solve()?)
         };
         Ok((model, angle))
     }
+}
 
-    fn doubts(&self, presses: &[Press], angle_deg: f64) -> Vec<CalibrationDoubt> {
-        let mut doubts = Vec::new();
-        let given = presses.len();
-        let used = self.circles.iter().filter(|c| c.used_px.is_some()).count();
-        if used < ENOUGH_PRESSES || 10 * used < 7 * given {
-            doubts.push(CalibrationDoubt::FewPresses { used, given });
-        }
-        if angle_deg > LARGE_ANGLE_DEG {
-            doubts.push(CalibrationDoubt::LargeAngle(angle_deg));
-        }
-        let pairs = presses.iter().zip(&self.circles);
-        let share = pairs.filter_map(|(press, circle)| Some(circle.used_px?[2] / press.ball_px));
-        let share = share.fold(0.0, f64::max);
-        if share < SMALL_SHARE {
-            doubts.push(CalibrationDoubt::FlatBall(share));
-        }
-        doubts
+/// Doubts about the presses of a calibration: the radius of the ball of each in pixels, and its
+/// circle.
+pub(crate) fn doubts(
+    balls_px: impl ExactSizeIterator<Item = f64>,
+    circles: &[CircleFinding],
+    angle_deg: f64,
+) -> Vec<CalibrationDoubt> {
+    let mut doubts = Vec::new();
+    let given = balls_px.len();
+    let used = circles.iter().filter(|c| c.used_px.is_some()).count();
+    if used < ENOUGH_PRESSES || 10 * used < 7 * given {
+        doubts.push(CalibrationDoubt::FewPresses { used, given });
     }
+    if angle_deg > LARGE_ANGLE_DEG {
+        doubts.push(CalibrationDoubt::LargeAngle(angle_deg));
+    }
+    let share = balls_px.zip(circles);
+    let share = share.filter_map(|(ball, circle)| Some(circle.used_px?[2] / ball));
+    let share = share.fold(0.0, f64::max);
+    if share < SMALL_SHARE {
+        doubts.push(CalibrationDoubt::FlatBall(share));
+    }
+    doubts
 }
 
 /// Standard error of a scale of 1 from its values in the presses: their root mean square deviation
 /// from 1, widened for few presses by Student's distribution.
-fn scatter(scales: &[f64]) -> f64 {
+pub(crate) fn scatter(scales: &[f64]) -> f64 {
     let n = scales.len() as f64;
     if n < 2.0 {
         return 1.0;
@@ -402,16 +421,17 @@ struct Press {
 }
 
 impl Press {
-    fn of(press: &BallPress<'_>, blank: &GelSensor) -> Result<(Self, Vec<FrameDoubt>), GelError> {
-        Requirement::Positive.check("ball radius", press.ball_radius_m)?;
-        let (rows, columns, _) = colour_image(press.frame)?.dim();
+    fn of(
+        press: &BallPress<'_>,
+        blank: &ColourSensor,
+    ) -> Result<(Self, Vec<FrameDoubt>), GelError> {
+        press.check()?;
+        let GelImage::Colour(frame) = press.frame else {
+            return Err(GelError::WrongImage { colours: true });
+        };
+        let (rows, columns, _) = colour_image(frame)?.dim();
         same_shape("frame of a press", blank.shape(), (rows, columns))?;
-        if let Some([x, y, radius]) = press.circle_px {
-            Requirement::Finite.check("circle's x", x)?;
-            Requirement::Finite.check("circle's y", y)?;
-            Requirement::Positive.check("circle's radius", radius)?;
-        }
-        let (frame, doubts) = blank.checked(Blurred::of(press.frame));
+        let (frame, doubts) = blank.checked(Blurred::of(frame));
         let press = Self {
             frame,
             ball_px: press.ball_radius_m / blank.model.pixel_size_m,
@@ -468,7 +488,7 @@ impl Press {
     }
 
     /// Centroid of the largest contact, and the radius of a circle of equal area.
-    fn found(&self, sensor: &GelSensor) -> Option<[f64; 3]> {
+    fn found(&self, sensor: &ColourSensor) -> Option<[f64; 3]> {
         let patches = sensor.patches(&self.frame);
         let largest = patches.iter().max_by(|a, b| a.area.total_cmp(&b.area))?;
         let n = largest.pixels.len() as f64;
@@ -491,7 +511,7 @@ fn flat(reference: &Blurred) -> Sums {
 
 /// Alternates circles and polynomial. `None` for presses in which no contact is found.
 fn find_circles(
-    blank: &GelSensor,
+    blank: &ColourSensor,
     presses: &[Press],
     face: BallFace,
 ) -> Result<Vec<Option<[f64; 3]>>, GelError> {
@@ -509,7 +529,7 @@ fn find_circles(
         for (press, circle) in presses.iter().zip(&circles) {
             total.add(&press.sums(&blank.reference, *circle, face), 1.0);
         }
-        let model = GelModel::new(blank.model.pixel_size_m, total.solve()?);
+        let model = ColourModel::new(blank.model.pixel_size_m, total.solve()?);
         let sensor = blank.with_model(model);
         let found = presses
             .iter()
@@ -584,7 +604,7 @@ struct Misses {
 impl Misses {
     fn add(
         &mut self,
-        without: &GelSensor,
+        without: &ColourSensor,
         press: &Press,
         [x0, y0, radius]: [f64; 3],
         face: BallFace,

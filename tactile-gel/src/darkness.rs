@@ -1,176 +1,289 @@
-//! A gel that darkens where it is pressed: all contacts, and the depth of each from a table.
+//! A gel that darkens where it is pressed: from grey levels to the face by a table, and contacts.
+//!
+//! The depth of a pixel follows from its darkness alone, that is its level in the reference minus
+//! its level in the frame. Contacts are the regions that are darker than a threshold.
+
+use std::sync::Arc;
 
 use ndarray::{Array2, ArrayView2};
-use tactile_core::{Estimate, InvalidOption, Requirement, regions};
+use tactile_core::regions;
+use tactile_core::statistics::median;
 use tactile_sfs::DepthTable;
 
 use crate::GelError;
+use crate::contacts::Patch;
 use crate::error::same_shape;
+use crate::face::{Face, GelFrame};
+use crate::frame_check::{Blocks, FrameDoubt, light};
+use crate::model::DarkModel;
 
 /// Regions with fewer pixels are specks of noise.
 const LEAST_PIXELS: usize = 12;
+/// The largest blurred darkness of a contact exceeds the threshold by this number of standard
+/// deviations of the noise. Others are islands of noise, for example where a dent fades.
+const EVIDENCE: f64 = 5.0;
+/// Standard error of the position of a contact's edge in pixels without noise: the threshold is
+/// crossed within a pixel.
+const EDGE_PX: f64 = 0.5;
+/// Number of directions in which an edge has an independent error. Pixels of one direction are
+/// averaged.
+const DIRECTIONS: f64 = 10.0;
+/// Noise of a difference of two 8-bit frames from rounding alone, in grey levels.
+const LEAST_NOISE_GREY: f64 = 0.41;
+/// Factor of the noise of a pixel after the blur by (1, 4, 6, 4, 1)/16 along both axes.
+const BLURRED_NOISE: f64 = 70.0 / 256.0;
+/// If the part of the frame that is brighter than the reference exceeds the darker part by this
+/// factor, frame and reference are probably exchanged.
+const BRIGHTER: usize = 4;
 
-/// A gel that darkens with depth, with its table of darkness and depth.
-///
-/// ```
-/// use ndarray::{Array2, s};
-/// use tactile_gel::DarkGel;
-/// use tactile_sfs::DepthTable;
-/// // A hundred grey levels of darkening are half a millimetre of depth.
-/// let gel = DarkGel::new(DepthTable::new(&[(0.0, 0.0), (100.0, 5e-4)])?, 3.0, [1e-4; 2])?;
-/// let reference = Array2::from_elem((64, 64), 200_u8);
-/// let mut frame = reference.clone();
-/// frame.slice_mut(s![10..30, 10..30]).fill(140);
-/// frame.slice_mut(s![40..50, 40..50]).fill(120);
-/// let found = gel.read(frame.view(), reference.view())?;
-/// let depths: Vec<f64> = found.contacts.iter().map(|c| 1e4 * c.depth_m.value).collect();
-/// assert!((depths[0] - 3.0).abs() < 1e-9 && (depths[1] - 4.0).abs() < 1e-9);
-/// # Ok::<(), tactile_gel::GelError>(())
-/// ```
-#[derive(Clone, Debug)]
-pub struct DarkGel {
+/// A sensor of a gel that darkens.
+#[derive(Clone)]
+pub(crate) struct DarkSensor {
+    pub(crate) model: DarkModel,
     table: DepthTable<f64>,
-    threshold_grey: f64,
-    pixel_size_m: [f64; 2],
+    reference: Arc<Array2<u8>>,
+    blocks: Arc<Blocks>,
 }
 
-/// Results of one frame of a gel that darkens.
-#[derive(Clone, Debug)]
-#[non_exhaustive]
-pub struct DarkFrame {
-    /// Depth in metres, NaN outside contacts.
-    pub depth_m: Array2<f64>,
-    /// Number of each pixel's contact, counted from 1 in the order of [`contacts`](Self::contacts).
-    /// 0 outside contacts.
-    pub labels: Array2<u16>,
-    /// Contacts, the widest first.
-    pub contacts: Vec<DarkPatch>,
-    /// Increase of the whole frame over the reference, in grey levels.
-    pub background_step_grey: f64,
+/// Darkness of a frame in grey levels, without the change of the whole frame.
+pub(crate) struct Darkness {
+    pub levels: Array2<f64>,
+    /// Increase of the whole frame over the reference.
+    pub step: f64,
+    /// The levels blurred by (1, 4, 6, 4, 1)/16 along both axes.
+    pub blurred: Array2<f64>,
+    /// Standard deviation of the noise.
+    noise: f64,
 }
 
-/// A contact of a gel that darkens.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[non_exhaustive]
-pub struct DarkPatch {
-    /// Column and row of the centroid. The error corresponds to an outline that is uncertain by
-    /// half a pixel at each pixel: for a disc it is 1/√(2 radius) of that.
-    pub centroid_px: [Estimate; 2],
-    /// Area in square metres.
-    pub area_m2: f64,
-    /// Maximum depth in metres, with the error from one grey level.
-    pub depth_m: Estimate,
-    /// Maximum darkness in grey levels.
-    pub darkness_grey: f64,
-    /// Whether the contact reaches the frame's border.
-    pub touches_border: bool,
-    /// Whether the darkness is outside the table, whose last depth is then used.
-    pub beyond_table: bool,
-}
-
-impl DarkGel {
-    /// Creates the gel from a table of darkness in grey levels and depth in metres, the darkness
-    /// that counts as contact, and the size of a pixel.
-    ///
-    /// # Errors
-    /// An error for a size or a threshold that is not positive.
-    pub fn new(
-        table: DepthTable<f64>,
-        threshold_grey: f64,
-        pixel_size_m: [f64; 2],
-    ) -> Result<Self, InvalidOption> {
-        Requirement::Positive.check("contact threshold", threshold_grey)?;
-        for size in pixel_size_m {
-            Requirement::Positive.check("pixel size", size)?;
-        }
-        Ok(Self {
-            table,
-            threshold_grey,
-            pixel_size_m,
-        })
-    }
-
-    /// All contacts of a frame, and the depths of their pixels. O(pixels).
-    ///
-    /// If all levels change by more than the threshold, measured along the border of the frame, the
-    /// change is subtracted.
-    ///
-    /// # Errors
-    /// [`GelError::ShapeMismatch`], [`GelError::EmptyImage`].
-    pub fn read(
-        &self,
-        frame: ArrayView2<'_, u8>,
-        reference: ArrayView2<'_, u8>,
-    ) -> Result<DarkFrame, GelError> {
-        let (rows, columns) = frame.dim();
+impl DarkSensor {
+    pub(crate) fn new(model: DarkModel, reference: ArrayView2<'_, u8>) -> Result<Self, GelError> {
+        let (rows, columns) = reference.dim();
         if rows == 0 || columns == 0 {
             return Err(GelError::EmptyImage { rows, columns });
         }
-        same_shape("frame", reference.dim(), frame.dim())?;
-        let step = border_step(frame, reference);
-        let step = if step.abs() > self.threshold_grey {
-            step
-        } else {
-            0.0
-        };
-        let darkness = Array2::from_shape_fn(frame.dim(), |at| {
-            f64::from(reference[at]) - f64::from(frame[at]) + step
-        });
-        let mut dark: Vec<bool> = darkness.iter().map(|d| *d > self.threshold_grey).collect();
-        let patches = regions(&mut dark, columns).filter(|patch| patch.len() >= LEAST_PIXELS);
-        let places = patches.map(|patch| patch.into_iter().map(|at| [at / columns, at % columns]));
-        let mut patches: Vec<Vec<[usize; 2]>> = places.map(Iterator::collect).collect();
-        patches.sort_by_key(|patch| core::cmp::Reverse(patch.len()));
-        let mut depth_m = Array2::from_elem(frame.dim(), f64::NAN);
-        let mut labels = Array2::zeros(frame.dim());
-        for (k, patch) in patches.iter().enumerate() {
-            for &at in patch {
-                depth_m[at] = self.table.depth(darkness[at]).0;
-                labels[at] = k as u16 + 1;
-            }
-        }
-        let contacts = patches.iter().map(|patch| self.contact(patch, &darkness));
-        Ok(DarkFrame {
-            contacts: contacts.collect(),
-            depth_m,
-            labels,
-            background_step_grey: step,
+        Ok(Self {
+            table: model.depth_table()?,
+            blocks: Arc::new(Blocks::of_grey(reference, 0.0)),
+            reference: Arc::new(reference.to_owned()),
+            model,
         })
     }
 
-    fn contact(&self, patch: &[[usize; 2]], darkness: &Array2<f64>) -> DarkPatch {
-        let n = patch.len() as f64;
-        let mean = |axis: usize| patch.iter().map(|at| at[axis] as f64).sum::<f64>() / n;
-        let radius_px = (n / core::f64::consts::PI).sqrt();
-        let centroid_error = 0.5 / (2.0 * radius_px).sqrt();
-        let darkest = patch.iter().map(|at| darkness[*at]).fold(0.0, f64::max);
-        let (depth, inside) = self.table.depth(darkest);
-        let level = (depth - self.table.depth(darkest - 1.0).0).abs();
-        let [width, height] = self.pixel_size_m;
-        let (rows, columns) = darkness.dim();
-        let at_border =
-            |&[r, c]: &[usize; 2]| r == 0 || c == 0 || r + 1 == rows || c + 1 == columns;
-        DarkPatch {
-            centroid_px: [mean(1), mean(0)].map(|value| Estimate::new(value, centroid_error)),
-            area_m2: n * width * height,
-            depth_m: Estimate::new(depth, level),
-            darkness_grey: darkest,
-            touches_border: patch.iter().any(at_border),
-            beyond_table: !inside,
+    /// The frame without contact.
+    pub(crate) fn reference(&self) -> ArrayView2<'_, u8> {
+        self.reference.view()
+    }
+
+    pub(crate) fn read(&self, frame: ArrayView2<'_, u8>) -> Result<GelFrame, GelError> {
+        same_shape("frame", self.reference.dim(), frame.dim())?;
+        let darkness = self.darkness(frame);
+        let mut doubts = self.doubts(frame, darkness.step);
+        if doubts.iter().any(FrameDoubt::refuses) {
+            return Ok(GelFrame::refused(frame.dim(), doubts));
         }
+        let patches = self.patches(&darkness);
+        doubts.extend(
+            self.exchanged(&darkness.levels)
+                .then_some(FrameDoubt::Brighter),
+        );
+        for (contact, patch) in patches.iter().enumerate() {
+            let darkest = patch.pixels.iter().map(|at| darkness.blurred[*at]);
+            if !self.table.depth(darkest.fold(0.0, f64::max)).1 {
+                doubts.push(FrameDoubt::BeyondTable { contact });
+            }
+        }
+        Ok(self.frame(&darkness, &patches, doubts))
+    }
+
+    /// Whether the frame comes from this sensor, from its border. The pattern of the light is
+    /// compared after the change of the whole frame is subtracted.
+    pub(crate) fn doubts(&self, frame: ArrayView2<'_, u8>, step: f64) -> Vec<FrameDoubt> {
+        use FrameDoubt::{AnotherPattern, Turned};
+        let of = |step| light(&Blocks::of_grey(frame, step), &self.blocks).doubts;
+        let is_pattern = |doubt: &FrameDoubt| matches!(doubt, AnotherPattern(_) | Turned(_));
+        let (mut doubts, mut pattern) = (of(0.0), of(step));
+        doubts.retain(|doubt| !is_pattern(doubt));
+        pattern.retain(is_pattern);
+        doubts.extend(pattern);
+        doubts
+    }
+
+    /// Darkness of a frame of the reference's size. If all levels change by more than the
+    /// threshold, measured along the border of the frame, the change is subtracted.
+    pub(crate) fn darkness(&self, frame: ArrayView2<'_, u8>) -> Darkness {
+        let (rows, columns) = frame.dim();
+        // A sixteenth of the frame on each side.
+        let (high, wide) = (rows.div_ceil(16), columns.div_ceil(16));
+        let border =
+            |r: usize, c: usize| r < high || c < wide || r + high >= rows || c + wide >= columns;
+        let steps = frame.indexed_iter().filter(|((r, c), _)| border(*r, *c));
+        let steps = steps.map(|(at, level)| f64::from(*level) - f64::from(self.reference[at]));
+        let mut steps: Vec<f64> = steps.collect();
+        let change = median(&mut steps);
+        let mut deviations: Vec<f64> = steps.iter().map(|step| (step - change).abs()).collect();
+        let noise = (1.4826 * median(&mut deviations)).max(LEAST_NOISE_GREY);
+        let is_step = change.abs() > self.model.threshold_grey;
+        let step = if is_step { change } else { 0.0 };
+        let mut levels = self.reference.mapv(f64::from);
+        levels.zip_mut_with(&frame, |level, own| *level += step - f64::from(*own));
+        Darkness {
+            blurred: blurred(&levels),
+            levels,
+            step,
+            noise,
+        }
+    }
+
+    /// The regions that are darker than the threshold, the widest first.
+    pub(crate) fn patches(&self, darkness: &Darkness) -> Vec<Patch> {
+        let Darkness {
+            levels,
+            blurred,
+            noise,
+            ..
+        } = darkness;
+        let columns = levels.ncols();
+        let least = self.model.threshold_grey + EVIDENCE * BLURRED_NOISE * noise;
+        let is_dark = |d: &f64| *d > self.model.threshold_grey;
+        let mut dark: Vec<bool> = levels.iter().map(is_dark).collect();
+        let found = regions(&mut dark, columns).filter(|region| region.len() >= LEAST_PIXELS);
+        let found = found.map(|region| patch(region, blurred, *noise));
+        let is_contact = |patch: &Patch| patch.pixels.iter().any(|at| blurred[*at] > least);
+        let mut patches: Vec<Patch> = found.filter(is_contact).collect();
+        patches.sort_by_key(|patch| core::cmp::Reverse(patch.pixels.len()));
+        patches
+    }
+
+    /// Whether far more of the frame is brighter than the reference than darker.
+    fn exchanged(&self, darkness: &Array2<f64>) -> bool {
+        let limit = self.model.threshold_grey;
+        let count = |is: &dyn Fn(f64) -> bool| darkness.iter().filter(|d| is(**d)).count();
+        count(&|d| d < -limit) > BRIGHTER * count(&|d| d > limit) + LEAST_PIXELS
+    }
+
+    fn frame(&self, darkness: &Darkness, patches: &[Patch], doubts: Vec<FrameDoubt>) -> GelFrame {
+        let size = self.model.pixel_size_m;
+        let blurred = &darkness.blurred;
+        let smooth = blurred.mapv(|level| self.depth(level));
+        let along = |axis: usize| {
+            Array2::from_shape_fn(smooth.dim(), |(r, c)| {
+                (gradient_at(&smooth, r, c)[axis] / size) as f32
+            })
+        };
+        let gradient = [along(0), along(1)];
+        // Depth per grey level, in the mean of the darkest contact or of the table.
+        let darkest = patches.iter().flat_map(|patch| &patch.pixels);
+        let darkest = darkest.map(|at| blurred[*at]).fold(0.0, f64::max);
+        let darkest = if darkest > 0.0 {
+            darkest
+        } else {
+            self.darkest()
+        };
+        let per_grey = self.depth(darkest) / darkest;
+        let rest_error = 0.5 * per_grey;
+        let noise = per_grey * darkness.noise;
+        let face = Face {
+            pixel_size_m: size,
+            slope_standard_error: self.model.slope_standard_error,
+            depth: &smooth,
+            gradient: &gradient,
+            rest_error,
+            noise_m: (noise * BLURRED_NOISE).hypot(rest_error),
+        };
+        let mut labels = Array2::zeros(smooth.dim());
+        for (k, patch) in patches.iter().enumerate() {
+            for at in &patch.pixels {
+                labels[*at] = k as u16 + 1;
+            }
+        }
+        let contacts = patches.iter().map(|patch| face.contact(patch)).collect();
+        let pixel = self.model.depth_standard_error_m.hypot(noise);
+        GelFrame {
+            contacts,
+            // Noise of a difference over two blurred pixels, whose blurs overlap.
+            normal_standard_error: noise * BLURRED_NOISE / size,
+            gradient,
+            depth_m: darkness.levels.mapv(|level| self.depth(level)),
+            depth_standard_error_m: [pixel, rest_error],
+            slope_standard_error: self.model.slope_standard_error,
+            background_step_grey: darkness.step,
+            labels,
+            doubts,
+        }
+    }
+
+    /// Darkness of the last entry of the table.
+    fn darkest(&self) -> f64 {
+        let levels = self.model.table.iter().map(|[darkness, _]| *darkness);
+        levels.fold(f64::MIN_POSITIVE, f64::max)
+    }
+
+    /// Depth of a darkness. Brightness counts as negative depth, so that noise has no mean depth.
+    fn depth(&self, darkness: f64) -> f64 {
+        self.table.depth(darkness.abs()).0.copysign(darkness)
     }
 }
 
-/// Median change of the levels along the border, a sixteenth of the frame on each side.
-fn border_step(frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) -> f64 {
-    let (rows, columns) = frame.dim();
-    let (high, wide) = (rows.div_ceil(16), columns.div_ceil(16));
-    let border =
-        |r: usize, c: usize| r < high || c < wide || r + high >= rows || c + wide >= columns;
-    let steps = frame.indexed_iter().filter(|((r, c), _)| border(*r, *c));
-    let steps = steps.map(|(at, level)| i16::from(*level) - i16::from(reference[at]));
-    let mut steps: Vec<i16> = steps.collect();
-    let middle = steps.len() / 2;
-    f64::from(*steps.select_nth_unstable(middle).1)
+/// A region from the indices of its pixels. Its rim are the pixels with a neighbour outside.
+fn patch(mut region: Vec<usize>, blurred: &Array2<f64>, noise: f64) -> Patch {
+    let (rows, columns) = blurred.dim();
+    region.sort_unstable();
+    let inside = |r: usize, c: usize| region.binary_search(&(r * columns + c)).is_ok();
+    let at_rim = |at: &&usize| {
+        let (r, c) = (*at / columns, *at % columns);
+        let free = [
+            r > 0 && !inside(r - 1, c),
+            r + 1 < rows && !inside(r + 1, c),
+            c > 0 && !inside(r, c - 1),
+            c + 1 < columns && !inside(r, c + 1),
+        ];
+        free.contains(&true)
+    };
+    let place = |at: &usize| [at / columns, at % columns];
+    let area = region.len() as f64;
+    let radius = (area / core::f64::consts::PI).sqrt();
+    let rim: Vec<[usize; 2]> = region.iter().filter(at_rim).map(place).collect();
+    // Where the darkness fades slowly, its noise moves the edge.
+    let slopes = rim.iter().map(|at| {
+        let [x, y] = gradient_at(blurred, at[0], at[1]);
+        x.hypot(y)
+    });
+    let slope = slopes.sum::<f64>() / rim.len().max(1) as f64;
+    let shift = noise / slope.max(f64::MIN_POSITIVE);
+    let edge_error = EDGE_PX.hypot(shift / (rim.len() as f64 / DIRECTIONS).max(1.0).sqrt());
+    Patch {
+        pixels: region.iter().map(place).collect(),
+        area,
+        edge_error: edge_error.min(radius),
+        radius,
+        rim,
+    }
+}
+
+/// Levels blurred by (1, 4, 6, 4, 1)/16 along both axes. The border is extended by its last pixel.
+fn blurred(levels: &Array2<f64>) -> Array2<f64> {
+    let (rows, columns) = levels.dim();
+    let near = |at: usize, k: usize, n: usize| (at + k).saturating_sub(2).min(n - 1);
+    let sum = |level: &dyn Fn(usize) -> f64| {
+        let [a, b, c, d, e] = [0, 1, 2, 3, 4].map(level);
+        (a + e + 4.0 * (b + d) + 6.0 * c) / 16.0
+    };
+    let along = Array2::from_shape_fn(levels.dim(), |(r, c)| {
+        sum(&|k| levels[[r, near(c, k, columns)]])
+    });
+    Array2::from_shape_fn(levels.dim(), |(r, c)| {
+        sum(&|k| along[[near(r, k, rows), c]])
+    })
+}
+
+/// Gradient along x and y per pixel by central differences, one-sided at the border.
+fn gradient_at(values: &Array2<f64>, r: usize, c: usize) -> [f64; 2] {
+    let (rows, columns) = values.dim();
+    let [left, right] = [c.saturating_sub(1), (c + 1).min(columns - 1)];
+    let [above, below] = [r.saturating_sub(1), (r + 1).min(rows - 1)];
+    [
+        (values[[r, right]] - values[[r, left]]) / (right - left).max(1) as f64,
+        (values[[below, c]] - values[[above, c]]) / (below - above).max(1) as f64,
+    ]
 }

@@ -13,7 +13,7 @@ use crate::frame_check::FrameDoubt;
 /// ```
 /// use tactile_gel::{GelError, GelSensor};
 /// let flat = ndarray::Array3::from_elem((40, 60, 3), 90);
-/// let error = GelSensor::calibrate(flat.view(), 5e-5, &[]).unwrap_err();
+/// let error = GelSensor::calibrate(&flat, 5e-5, &[]).unwrap_err();
 /// assert_eq!(error, GelError::TooFewPresses { needed: 3, available: 0 });
 /// ```
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -37,6 +37,12 @@ pub enum GelError {
         /// Rows and columns found.
         found: [usize; 2],
     },
+    /// The frame has grey levels and the gel is lit in colours, or the reverse.
+    #[error("{}", if *.colours { COLOURS } else { GREY })]
+    WrongImage {
+        /// Whether colours are needed.
+        colours: bool,
+    },
     /// An option is outside its range.
     #[error(transparent)]
     InvalidOption(#[from] InvalidOption),
@@ -58,6 +64,9 @@ pub enum GelError {
         /// The doubt about the first of them.
         doubt: FrameDoubt,
     },
+    /// The frame does not come from this sensor.
+    #[error("the frame does not come from this sensor: {0}")]
+    OtherFrame(FrameDoubt),
     /// The presses do not determine the sensor.
     #[error("the presses do not determine the sensor")]
     NoSolution,
@@ -77,6 +86,11 @@ pub enum GelError {
     #[error(transparent)]
     Law(#[from] ElasticityError),
 }
+
+const COLOURS: &str = "the frame has grey levels, but the gel is lit in colours: three channels \
+                       are needed";
+const GREY: &str = "the frame has colours, but the gel darkens: grey levels are needed, converted \
+                    as for its table";
 
 /// Rejects an input of another shape.
 pub(crate) fn same_shape(

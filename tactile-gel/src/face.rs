@@ -7,7 +7,7 @@ use crate::GelError;
 use crate::contacts::{Cells, Patch, block_means};
 use crate::frame_check::FrameDoubt;
 use crate::integration::integrated;
-use crate::model::GelModel;
+use crate::model::ColourModel;
 use crate::plane::Plane;
 use crate::rest::{Tails, rest};
 
@@ -19,6 +19,8 @@ const BLUR: f64 = 1.0;
 /// Error of an integrated depth in pixels times slope, from noise that the scale of the calibration
 /// does not include.
 const DEPTH_NOISE: f64 = 0.01;
+/// Depths within this number of standard errors of the noise do not differ from the maximum.
+const PLATEAU: f64 = 2.0;
 /// Slopes are not those of a surface if the root mean square of their curl exceeds this fraction of
 /// that of their divergence.
 const CURL: f32 = 0.6;
@@ -43,10 +45,13 @@ pub struct GelFrame {
     pub depth_standard_error_m: [f64; 2],
     /// Relative standard error common to all slopes.
     pub slope_standard_error: f64,
+    /// Increase of the level of the whole frame over the reference, in grey levels, that was
+    /// subtracted. 0 for gels lit in colours, whose frames are divided by their exposure.
+    pub background_step_grey: f64,
     /// Number of each pixel's contact, counted from 1 in the order of [`contacts`](Self::contacts).
     /// 0 outside contacts.
     pub labels: Array2<u16>,
-    /// Contacts in descending order of pressure.
+    /// Contacts in descending order of pressure, or of area for gels that darken.
     pub contacts: Vec<GelContact>,
     /// Why the frame may not come from this sensor.
     pub doubts: Vec<FrameDoubt>,
@@ -84,6 +89,7 @@ impl GelFrame {
             depth_m: Array2::from_elem(shape, f64::NAN),
             depth_standard_error_m: [f64::NAN; 2],
             slope_standard_error: f64::NAN,
+            background_step_grey: 0.0,
             labels: Array2::zeros(shape),
             contacts: Vec::new(),
             doubts,
@@ -115,7 +121,7 @@ pub(crate) fn gradient_errors([p, q]: [f32; 2]) -> [f32; 2] {
 
 /// Computes face and contacts from slopes.
 pub(crate) fn frame(
-    (model, tails): (&GelModel, &Tails),
+    (model, tails): (&ColourModel, &Tails),
     gradient: [Array2<f32>; 2],
     cells: &Cells,
     patches: Vec<Patch>,
@@ -134,10 +140,12 @@ pub(crate) fn frame(
     depth -= rest;
     let contacts = patches.iter().map(|patch| {
         let face = Face {
-            model,
+            pixel_size_m: size,
+            slope_standard_error: model.slope_standard_error,
             depth: &depth,
             gradient: &gradient,
             rest_error,
+            noise_m: 0.0,
         };
         face.contact(patch)
     });
@@ -149,16 +157,21 @@ pub(crate) fn frame(
         depth_m: depth,
         depth_standard_error_m: [model.depth_standard_error_m, rest_error],
         slope_standard_error: model.slope_standard_error,
+        background_step_grey: 0.0,
         labels,
         doubts,
     })
 }
 
-struct Face<'a> {
-    model: &'a GelModel,
-    depth: &'a Array2<f64>,
-    gradient: &'a [Array2<f32>; 2],
-    rest_error: f64,
+/// A face whose contacts are measured. It is blurred by [`BLUR`].
+pub(crate) struct Face<'a> {
+    pub pixel_size_m: f64,
+    pub slope_standard_error: f64,
+    pub depth: &'a Array2<f64>,
+    pub gradient: &'a [Array2<f32>; 2],
+    pub rest_error: f64,
+    /// Standard error of a depth from the noise of its pixel.
+    pub noise_m: f64,
 }
 
 impl Face<'_> {
@@ -176,12 +189,26 @@ impl Face<'_> {
         });
         // Differences over four pixels, in five lines.
         let divergence = along.sum::<f64>() / 20.0;
-        -0.5 * BLUR * divergence.min(0.0) * self.model.pixel_size_m
+        -0.5 * BLUR * divergence.min(0.0) * self.pixel_size_m
     }
 
-    fn contact(&self, patch: &Patch) -> GelContact {
+    /// The middle of the pixels whose depth is the maximum within the noise.
+    fn deepest(&self, patch: &Patch) -> [usize; 2] {
+        let depths = patch.pixels.iter().map(|at| self.depth[*at]);
+        let largest = depths.fold(f64::NEG_INFINITY, f64::max);
+        let limit = largest - PLATEAU * self.noise_m;
+        let plateau = patch.pixels.iter().filter(|at| self.depth[**at] >= limit);
+        let count = plateau.clone().count().max(1) as f64;
+        let middle = |axis: usize| plateau.clone().map(|at| at[axis] as f64).sum::<f64>() / count;
+        let middle = [middle(0), middle(1)];
+        let away = |at: &[usize; 2]| (at[0] as f64 - middle[0]).hypot(at[1] as f64 - middle[1]);
+        let nearest = plateau.min_by(|a, b| away(a).total_cmp(&away(b)));
+        nearest.copied().unwrap_or_default()
+    }
+
+    pub(crate) fn contact(&self, patch: &Patch) -> GelContact {
         let (rows, columns) = self.depth.dim();
-        let size = self.model.pixel_size_m;
+        let size = self.pixel_size_m;
         let n = patch.pixels.len() as f64;
         let mean = |axis: usize| patch.pixels.iter().map(|at| at[axis] as f64).sum::<f64>() / n;
         // The outline has an independent error in each of about ten directions.
@@ -198,15 +225,11 @@ impl Face<'_> {
             )
         });
         let [rim, slope] = sums.map(|sum| sum / count.max(1.0));
-        let deepest = patch
-            .pixels
-            .iter()
-            .max_by(|a, b| self.depth[**a].total_cmp(&self.depth[**b]));
-        let deepest = deepest.copied().unwrap_or_default();
+        let deepest = self.deepest(patch);
         let below_far = self.depth[deepest] + self.blurred_off(deepest);
         let below_rim = (below_far - rim).max(0.0);
-        let scale = self.model.slope_standard_error;
-        let noise = DEPTH_NOISE * size * slope.max(0.1);
+        let scale = self.slope_standard_error;
+        let noise = (DEPTH_NOISE * size * slope.max(0.1)).hypot(self.noise_m);
         let own = (scale * below_rim)
             .hypot(slope * patch.edge_error * size)
             .hypot(noise);

@@ -1,12 +1,12 @@
 //! The layer of the gel, and the normal force from the shape of its face.
 
-use ndarray::{Array2, ArrayView3};
+use ndarray::Array2;
 use tactile_core::Estimate;
 
 use crate::contacts::{block_means, quantile};
 use crate::layer::GelLayer;
 use crate::plane::{LayerShape, Plane};
-use crate::{GaugeForce, GelError, GelFrame, GelSensor, MarkerField};
+use crate::{GaugeForce, GelError, GelFrame, GelImage, GelSensor, MarkerField};
 
 /// Blocks of pixels along the longer side of a frame. The force is a sum, so finer blocks change it
 /// little.
@@ -96,7 +96,7 @@ impl GelForce {
     pub fn new(gel: &GelLayer, sensor: &GelSensor) -> Result<Self, GelError> {
         let (rows, columns) = sensor.shape();
         let block = rows.max(columns).div_ceil(BLOCKS).min(rows).min(columns);
-        let cell_m = block as f64 * sensor.model().pixel_size_m;
+        let cell_m = block as f64 * sensor.pixel_size_m();
         gel.guide()?;
         let modulus = gel.youngs_modulus_pa / (1.0 - gel.poisson_ratio.powi(2));
         let layer = LayerShape {
@@ -108,7 +108,7 @@ impl GelForce {
             block,
             newtons: 0.5 * modulus * cell_m * cell_m,
             modulus_error: gel.youngs_modulus_error_pa / gel.youngs_modulus_pa,
-            pixel_size_m: sensor.model().pixel_size_m,
+            pixel_size_m: sensor.pixel_size_m(),
             shear_pa_per_m: gel.shear_pa_per_m(),
         })
     }
@@ -264,12 +264,12 @@ impl GelLayer {
     /// Fits the modulus of the layer to frames under known weights, given as frame and force in
     /// newtons.
     ///
+    /// # Errors
     /// [`GelError::NoContact`] for a weight without contact, and the errors of [`GelSensor::read`].
-    /// [`GelError::NoContact`] for a weight without contact, and those of [`GelSensor::read`].
     pub fn weighed(
         self,
         sensor: &GelSensor,
-        weights: &[(ArrayView3<'_, u8>, Estimate)],
+        weights: &[(GelImage<'_>, Estimate)],
     ) -> Result<Self, GelError> {
         // The law is linear, so it is solved for a modulus of 1 Pa.
         let unit = Self {

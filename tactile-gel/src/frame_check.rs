@@ -6,7 +6,7 @@
 //! light. If the pattern differs, the frame is also compared with exchanged channels, rotated and
 //! mirrored, and the variant that fits is reported.
 
-use ndarray::Array3;
+use ndarray::{Array3, ArrayView2};
 use tactile_core::statistics::{median, quantile};
 
 use crate::gradients::Blurred;
@@ -31,7 +31,8 @@ const UNTOUCHED: f64 = 0.3;
 const FITS_BETTER: f64 = 0.45;
 /// A frame is black below this level, and white above 255 minus this level.
 const DARK: f64 = 6.0;
-/// A frame is noise if its neighbouring pixels differ by this multiple of those of the reference.
+/// A frame is noise if its pixels deviate from their neighbours by this multiple of those of the
+/// reference.
 const NOISY: f64 = 12.0;
 
 /// Rotation or reflection of a frame.
@@ -74,12 +75,26 @@ pub enum FrameDoubt {
     AnotherPattern(f64),
     /// The slopes do not belong to a face that is pressed in.
     NoSurface,
+    /// More of the frame is brighter than the reference than darker, on a gel that darkens.
+    Brighter,
+    /// A contact, counted from 0, is darker than the last entry of the table, whose depth is used.
+    BeyondTable {
+        /// The contact.
+        contact: usize,
+    },
 }
 
 impl FrameDoubt {
     /// Whether the frame cannot be used at all.
     pub fn refuses(&self) -> bool {
-        !matches!(self, Self::Exposure(_) | Self::Balance(_) | Self::NoSurface)
+        !matches!(
+            self,
+            Self::Exposure(_)
+                | Self::Balance(_)
+                | Self::NoSurface
+                | Self::Brighter
+                | Self::BeyondTable { .. }
+        )
     }
 
     /// A keyword for programs.
@@ -94,6 +109,8 @@ impl FrameDoubt {
             Self::Turned(_) => "frame_turned",
             Self::AnotherPattern(_) => "another_unit",
             Self::NoSurface => "no_surface",
+            Self::Brighter => "brighter_than_reference",
+            Self::BeyondTable { .. } => "beyond_table",
         }
     }
 }
@@ -146,6 +163,16 @@ impl core::fmt::Display for FrameDoubt {
                 "the colours do not correspond to an indented surface: exchanged channels, a \
                  rotated or mirrored frame, or other lamps"
             ),
+            Self::Brighter => write!(
+                f,
+                "the frame is brighter than the reference: are the two exchanged?"
+            ),
+            Self::BeyondTable { contact } => write!(
+                f,
+                "contact {} is darker than the last entry of the table: its depth is at least the \
+                 stated one",
+                contact + 1
+            ),
         }
     }
 }
@@ -157,7 +184,8 @@ pub(crate) struct FrameLight {
     pub doubts: Vec<FrameDoubt>,
 }
 
-/// Block means of one image, and the differences between neighbouring pixels.
+/// Block means of one image, and the median deviation of pixels from their neighbours in grey
+/// levels.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Blocks {
     means: Array3<f32>,
@@ -166,36 +194,63 @@ pub(crate) struct Blocks {
 
 impl Blocks {
     pub(crate) fn of(image: &Blurred) -> Self {
-        let (rows, columns) = image.dim();
+        Self::of_lines(image.dim(), 3, |channel, row| image.line(channel, row))
+    }
+
+    /// Grey levels minus `step` count as three equal channels.
+    pub(crate) fn of_grey(image: ArrayView2<'_, u8>, step: f64) -> Self {
+        let levels = image.mapv(|level| (256.0 * (f64::from(level) - step)) as u16);
+        Self::of_lines(levels.dim(), 1, |_, row| {
+            levels.row(row).to_slice().unwrap_or_default()
+        })
+    }
+
+    /// Blocks of an image whose lines, by channel and row, hold 1/256 grey level. If there is one
+    /// channel, the others are equal to it.
+    fn of_lines<'a>(
+        (rows, columns): (usize, usize),
+        channels: usize,
+        line_of: impl Fn(usize, usize) -> &'a [u16],
+    ) -> Self {
         let size = rows.max(columns).div_ceil(BLOCKS).max(LEAST_BLOCK);
         let size = size.min(rows).min(columns);
         let (high, wide) = (rows / size, columns / size);
         let mut means = Array3::zeros((high, wide, 3));
-        let (mut rough, mut steps) = (0_u64, 0_u64);
+        // Number of deviations by their size in 1/16 grey level.
+        let mut rough = vec![0_u32; 4096];
         for r in 0..high {
             for c in 0..wide {
                 let (from, to) = (c * size, (c + 1) * size);
-                for k in 0..3 {
+                for k in 0..channels {
                     // Every other pixel of every other row is enough for a mean.
                     let (mut sum, mut count) = (0_u64, 0_u64);
                     for row in (r * size..(r + 1) * size).step_by(2) {
-                        let line = image.line(k, row);
+                        let line = line_of(k, row);
                         for column in (from..to).step_by(2) {
                             sum += u64::from(line[column]);
                             count += 1;
-                            if column >= 3 {
-                                rough += u64::from(line[column].abs_diff(line[column - 3]));
-                                steps += u64::from(k == 0);
+                            // A slope of the levels has no second difference.
+                            if column >= 3 && column + 3 < columns {
+                                let beside = (line[column - 3] / 2) + (line[column + 3] / 2);
+                                rough[usize::from(line[column].abs_diff(beside) >> 4)] += 1;
                             }
                         }
                     }
-                    means[[r, c, k]] = sum as f32 / (256.0 * count as f32);
+                    let mean = sum as f32 / (256.0 * count as f32);
+                    (k..=k + 3 - channels).for_each(|k| means[[r, c, k]] = mean);
                 }
             }
         }
+        // The median, because the edges of a contact concern few pixels.
+        let half = rough.iter().sum::<u32>() / 2;
+        let mut below = 0;
+        let median = rough.iter().position(|count| {
+            below += count;
+            below > half
+        });
         Self {
             means,
-            roughness: rough as f64 / 256.0 / steps.max(1) as f64,
+            roughness: median.unwrap_or(0) as f64 / 16.0,
         }
     }
 

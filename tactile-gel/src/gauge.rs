@@ -19,7 +19,6 @@ const BEYOND: f64 = 1.5;
 ///
 /// ```
 /// # use ndarray::Array2;
-/// # use tactile_gel::{GelModel, GelSensor};
 /// # use tactile_gel::GelError;
 /// use tactile_gel::GaugeForce;
 /// // Volumes in cubic metres and gauge readings in newtons.

@@ -3,7 +3,9 @@
 
 mod ball;
 mod calibration;
+mod colour;
 mod contacts;
+mod dark_calibration;
 mod darkness;
 mod error;
 mod face;
@@ -11,6 +13,7 @@ mod force;
 mod frame_check;
 mod gauge;
 mod gradients;
+mod image;
 mod integration;
 mod layer;
 mod marker_field;
@@ -24,15 +27,15 @@ pub mod simulate;
 
 pub use ball::BallFace;
 pub use calibration::{BallPress, CalibrationDoubt, CalibrationReport, CircleFinding};
-pub use darkness::{DarkFrame, DarkGel, DarkPatch};
 pub use error::GelError;
 pub use face::{GelContact, GelFrame};
 pub use force::{GelForce, GelLaw, GelWrench};
 pub use frame_check::{FrameDoubt, Turn};
 pub use gauge::GaugeForce;
+pub use image::GelImage;
 pub use layer::GelLayer;
 pub use marker_field::{MarkerField, MarkerShear, MarkerSlip, MarkerTrack, track_markers};
 pub use markers::{Marker, find_markers};
-pub use model::GelModel;
+pub use model::{ColourModel, DarkModel, GelModel};
 pub use sensor::GelSensor;
 pub use {nalgebra, ndarray};

@@ -1,53 +1,39 @@
-//! A gel lit in colours: from a frame to gradients, face and contacts.
-//!
-//! The colour of a pixel, minus that of the untouched gel, depends on the normal of the surface and
-//! on the position in the image. A third-degree polynomial in the three colour differences, with
-//! coefficients that vary linearly over the image, gives the components n_x and n_y of the normal.
-//! Presses of one ball determine it: inside the contact circle n = (x − x₀, y − y₀)/R. In
-//! leave-one-out tests it was as accurate as polynomials of higher degree, with fewer parameters.
+//! A gel sensor of either kind.
 
-use std::sync::Arc;
+use crate::colour::ColourSensor;
+use crate::darkness::DarkSensor;
+use crate::{BallPress, CalibrationReport, GelError, GelFrame, GelImage, GelModel};
 
-use ndarray::{Array2, Array3, ArrayView3};
-use tactile_core::{Requirement, vectorised};
-
-use crate::GelError;
-use crate::contacts::{Cells, Patch, block_means, patches};
-use crate::error::same_shape;
-use crate::face::{self, GelFrame, SurfaceCheck};
-use crate::frame_check::{Blocks, FrameDoubt, light};
-use crate::gradients::{Blurred, TERMS, normals};
-use crate::model::GelModel;
-use crate::plane::Plane;
-use crate::rest::Tails;
-
-/// Largest sine of a slope. A steeper one is limited to 76°, because light hardly changes beyond it
-/// and the tangent diverges.
-const STEEPEST: f32 = 0.97;
-
-/// Minimum noise in grey levels of the difference of two 8-bit frames, from rounding alone.
-const LEAST_NOISE_GREY: f64 = 0.41;
-/// Fraction of a pixel's noise in the smoothed pressure. The blurs by frame, cells and smoothing
-/// add up to a variance of 9.25 px², which reduces noise by √(4π · 9.25).
-const SMOOTHED: f64 = 0.093;
-/// Padding of the pressure grid, as a fraction of its size. Periodic copies of a contact decay with
-/// the square of the distance.
-const ROOM: f64 = 0.2;
-
-/// A gel sensor, which derives the shape of the face from its colours.
+/// A gel sensor: a gel lit in colours, or a gel that darkens where it is pressed.
 ///
-/// It reads 8-bit frames of three channels. Changes of exposure and of the level of a channel
-/// between frames are corrected with the border of the frame. [`calibrate`](Self::calibrate)
-/// creates a sensor from presses of a ball. O(n log n) for the n pixels of a frame.
+/// It reads 8-bit frames, of three channels or of grey levels. [`calibrate`](Self::calibrate)
+/// creates a sensor from presses of a ball, [`new`](Self::new) from its parameters.
+///
+/// ```
+/// use ndarray::{Array2, s};
+/// use tactile_gel::{DarkModel, GelSensor};
+/// // A hundred grey levels of darkening are half a millimetre of depth.
+/// let model = DarkModel::new(1e-4, vec![[0.0, 0.0], [100.0, 5e-4]]);
+/// let reference = Array2::from_elem((64, 64), 200_u8);
+/// let sensor = GelSensor::new(model, &reference)?;
+/// let mut frame = reference.clone();
+/// frame.slice_mut(s![10..30, 10..30]).fill(140);
+/// frame.slice_mut(s![40..50, 40..50]).fill(120);
+/// let found = sensor.read(&frame)?;
+/// let depth = |k: usize| found.contacts[k].depth_below_far_m.value;
+/// assert!((depth(0) - 3e-4).abs() < 1e-12 && (depth(1) - 4e-4).abs() < 1e-12);
+/// # Ok::<(), tactile_gel::GelError>(())
+/// ```
 #[derive(Clone)]
 pub struct GelSensor {
-    pub(crate) model: GelModel,
-    untouched: Arc<Array3<u8>>,
-    pub(crate) reference: Arc<Blurred>,
-    blocks: Arc<Blocks>,
-    pub(crate) plane: Arc<Plane>,
-    check: Arc<SurfaceCheck>,
-    tails: Arc<Tails>,
+    kind: Kind,
+    model: GelModel,
+}
+
+#[derive(Clone)]
+enum Kind {
+    Colour(ColourSensor),
+    Dark(DarkSensor),
 }
 
 impl core::fmt::Debug for GelSensor {
@@ -60,162 +46,116 @@ impl core::fmt::Debug for GelSensor {
 }
 
 impl GelSensor {
-    /// Creates a sensor from its model and its frame without contact, `[row, column, channel]`.
+    /// Creates a sensor from its parameters and its frame without contact.
     ///
     /// # Errors
-    /// [`GelError::EmptyImage`], [`GelError::ShapeMismatch`] unless there are three channels and 60
-    /// coefficients, [`GelError::InvalidOption`] for a pixel size that is not positive, a
-    /// coefficient that is not finite or a negative error.
-    pub fn new(model: GelModel, reference: ArrayView3<'_, u8>) -> Result<Self, GelError> {
-        Requirement::Positive.check("pixel size", model.pixel_size_m)?;
-        Requirement::NonNegative.check("normal error", model.normal_standard_error)?;
-        Requirement::NonNegative.check("depth error", model.depth_standard_error_m)?;
-        Requirement::NonNegative.check("slope error", model.slope_standard_error)?;
-        for component in &model.coefficients {
-            same_shape("coefficients", (1, TERMS), (1, component.len()))?;
-            for value in component {
-                Requirement::Finite.check("coefficient", *value)?;
+    /// [`GelError::EmptyImage`], [`GelError::WrongImage`] for grey levels of a gel lit in colours
+    /// and the reverse, [`GelError::ShapeMismatch`] unless there are three channels and 60
+    /// coefficients, [`GelError::Surface`] for a table that does not increase,
+    /// [`GelError::InvalidOption`] for a pixel size or threshold that is not positive, a coefficient
+    /// that is not finite or a negative error.
+    pub fn new<'a>(
+        model: impl Into<GelModel>,
+        reference: impl Into<GelImage<'a>>,
+    ) -> Result<Self, GelError> {
+        let (model, reference) = (model.into(), reference.into());
+        model.check()?;
+        let kind = match (&model, reference) {
+            (GelModel::Colour(model), GelImage::Colour(reference)) => {
+                Kind::Colour(ColourSensor::new(model.clone(), reference)?)
+            }
+            (GelModel::Dark(model), GelImage::Grey(reference)) => {
+                Kind::Dark(DarkSensor::new(model.clone(), reference)?)
+            }
+            (GelModel::Colour(_), _) => return Err(GelError::WrongImage { colours: true }),
+            (GelModel::Dark(_), _) => return Err(GelError::WrongImage { colours: false }),
+        };
+        Ok(Self { kind, model })
+    }
+
+    /// Calibrates a sensor from its frame without contact and at least three presses of balls: of a
+    /// gel lit in colours if the reference has colours, otherwise of a gel that darkens.
+    ///
+    /// **Colours.** Circles and polynomial are determined alternately until no circle changes by a
+    /// tenth of a pixel. The polynomial follows from the circles by ridge regression, and the
+    /// circles from the contacts in its normals. Without drawn circles, the start is the region of
+    /// large colour differences.
+    ///
+    /// A circle drawn by hand may be off by several pixels. The median offset between drawn and
+    /// found circles is the user's convention for the edge of a contact, and is kept. Apart from
+    /// this offset, the found circles are used. A drawn circle is wrong if it is off by more than
+    /// three times the median misfit and more than a tenth of the ball's radius.
+    ///
+    /// **Darkness.** The depth z = c₁ d + c₂ d² of the darkness d is fitted to the caps of the
+    /// balls, z = δ + √(R² − r²) − R, over the pixels with at least 0.6 of the largest darkness of
+    /// their press, or inside the drawn circle. The depths δ of the presses are fitted with the
+    /// table. The balls determine the shape; that no darkness is no depth is assumed.
+    ///
+    /// Errors come from leaving out one press at a time. They are the 68.3 % quantile of the
+    /// differences to the ball. The common error of all slopes comes from the scatter of the
+    /// presses, by Student's distribution for few presses.
+    ///
+    /// # Errors
+    /// [`GelError::TooFewPresses`], [`GelError::ShapeMismatch`], [`GelError::WrongImage`],
+    /// [`GelError::InvalidOption`] for lengths that are not positive, [`GelError::OtherFrames`] if
+    /// most presses do not come from the sensor of the reference, [`GelError::NoSolution`].
+    pub fn calibrate<'a>(
+        reference: impl Into<GelImage<'a>>,
+        pixel_size_m: f64,
+        presses: &[BallPress<'_>],
+    ) -> Result<(Self, CalibrationReport), GelError> {
+        match reference.into() {
+            GelImage::Colour(reference) => {
+                let (sensor, report) = ColourSensor::calibrate(reference, pixel_size_m, presses)?;
+                let model = sensor.model.clone().into();
+                let kind = Kind::Colour(sensor);
+                Ok((Self { kind, model }, report))
+            }
+            GelImage::Grey(reference) => {
+                let (sensor, report) = DarkSensor::calibrate(reference, pixel_size_m, presses)?;
+                let model = sensor.model.clone().into();
+                let kind = Kind::Dark(sensor);
+                Ok((Self { kind, model }, report))
             }
         }
-        Ok(Self::of_checked(model, colour_image(reference)?))
     }
 
-    pub(crate) fn of_checked(model: GelModel, reference: ArrayView3<'_, u8>) -> Self {
-        let (rows, columns, _) = reference.dim();
-        let blurred = Blurred::of(reference);
-        Self {
-            untouched: Arc::new(reference.to_owned()),
-            blocks: Arc::new(Blocks::of(&blurred)),
-            plane: Arc::new(Plane::new((rows / 2, columns / 2), ROOM, None)),
-            check: Arc::new(SurfaceCheck::new((rows, columns))),
-            tails: Arc::new(Tails::new()),
-            model,
-            reference: Arc::new(blurred),
-        }
-    }
-
-    /// The same sensor with other parameters.
-    pub(crate) fn with_model(&self, model: GelModel) -> Self {
-        Self {
-            model,
-            ..self.clone()
-        }
-    }
-
-    /// The parameters of the calibration.
+    /// The parameters.
     pub fn model(&self) -> &GelModel {
         &self.model
     }
 
+    /// Size of a pixel on the gel in metres.
+    pub fn pixel_size_m(&self) -> f64 {
+        self.model.pixel_size_m()
+    }
+
     /// The frame without contact.
-    pub fn reference(&self) -> ArrayView3<'_, u8> {
-        self.untouched.view()
+    pub fn reference(&self) -> GelImage<'_> {
+        match &self.kind {
+            Kind::Colour(sensor) => sensor.reference().into(),
+            Kind::Dark(sensor) => sensor.reference().into(),
+        }
     }
 
     /// Number of rows and columns of its frames.
     pub fn shape(&self) -> (usize, usize) {
-        self.reference.dim()
+        self.reference().dim()
     }
 
     /// Gradients, face and contacts of a frame of the reference's size.
     ///
     /// A frame that does not come from this sensor has [`doubts`](GelFrame::doubts). If they
-    /// [reject](FrameDoubt::refuses) it, it has no contacts and its face is NaN.
+    /// [reject](crate::FrameDoubt::refuses) it, it has no contacts and its face is NaN.
     ///
     /// # Errors
-    /// [`GelError::ShapeMismatch`].
-    pub fn read(&self, frame: ArrayView3<'_, u8>) -> Result<GelFrame, GelError> {
-        let frame = colour_image(frame)?;
-        let (rows, columns, _) = frame.dim();
-        same_shape("frame", self.reference.dim(), (rows, columns))?;
-        let (frame, doubts) = self.checked(Blurred::of(frame));
-        if doubts.iter().any(FrameDoubt::refuses) {
-            return Ok(GelFrame::refused((rows, columns), doubts));
-        }
-        self.read_blurred(&frame, doubts)
-    }
-
-    /// A frame corrected to the exposure of the reference, with doubts about its origin.
-    pub(crate) fn checked(&self, frame: Blurred) -> (Blurred, Vec<FrameDoubt>) {
-        let light = light(&Blocks::of(&frame), &self.blocks);
-        (frame.divided_by(light.gain), light.doubts)
-    }
-
-    pub(crate) fn read_blurred(
-        &self,
-        frame: &Blurred,
-        mut doubts: Vec<FrameDoubt>,
-    ) -> Result<GelFrame, GelError> {
-        let slopes = self.slopes(frame);
-        let cells = self.cells(&slopes);
-        if self.check.no_surface(&cells, self.noise_floor()) {
-            doubts.push(FrameDoubt::NoSurface);
-        }
-        let found = patches(&cells, self.shape(), self.noise_floor());
-        face::frame((&self.model, &self.tails), slopes, &cells, found, doubts)
-    }
-
-    /// The contact regions of a frame.
-    pub(crate) fn patches(&self, frame: &Blurred) -> Vec<Patch> {
-        patches(
-            &self.cells(&self.slopes(frame)),
-            self.shape(),
-            self.noise_floor(),
-        )
-    }
-
-    /// Slopes of the depth at each pixel.
-    fn slopes(&self, frame: &Blurred) -> [Array2<f32>; 2] {
-        let [mut p, mut q] = normals(frame, &self.reference, &self.model.coefficients);
-        // Arrays created here are contiguous.
-        if let (Some(p), Some(q)) = (p.as_slice_mut(), q.as_slice_mut()) {
-            slopes(p, q);
-        }
-        [p, q]
-    }
-
-    /// Slopes and pressure on cells of 2 × 2 pixels.
-    fn cells(&self, slopes: &[Array2<f32>; 2]) -> Cells {
-        let [p, q] = slopes.each_ref().map(|slope| block_means(slope.view(), 2));
-        Cells {
-            pressure: self.plane.pressure(p.view(), q.view()),
-            slopes: [p, q],
+    /// [`GelError::ShapeMismatch`], [`GelError::WrongImage`].
+    pub fn read<'a>(&self, frame: impl Into<GelImage<'a>>) -> Result<GelFrame, GelError> {
+        match (&self.kind, frame.into()) {
+            (Kind::Colour(sensor), GelImage::Colour(frame)) => sensor.read(frame),
+            (Kind::Dark(sensor), GelImage::Grey(frame)) => sensor.read(frame),
+            (Kind::Colour(_), _) => Err(GelError::WrongImage { colours: true }),
+            (Kind::Dark(_), _) => Err(GelError::WrongImage { colours: false }),
         }
     }
-
-    /// The minimum noise of the smoothed pressure, from the rounding of levels.
-    fn noise_floor(&self) -> f32 {
-        let linear = self.model.coefficients.iter().flat_map(|c| &c[1..4]);
-        let square: f64 = linear.map(|c| c * c).sum();
-        (LEAST_NOISE_GREY * SMOOTHED / 50.0 * (0.5 * square).sqrt()) as f32
-    }
-}
-
-/// Converts normals into slopes of the depth.
-fn slopes(p: &mut [f32], q: &mut [f32]) {
-    vectorised(
-        #[inline(always)]
-        || {
-            for (p, q) in p.iter_mut().zip(q.iter_mut()) {
-                let sine = (*p * *p + *q * *q).sqrt();
-                // Both components are reduced by the same factor, which preserves the direction of
-                // the slope.
-                let cut = STEEPEST / sine.max(STEEPEST);
-                let (x, y) = (*p * cut, *q * cut);
-                // The outward normals of the gel point up where the depth decreases.
-                let up = -(1.0 - x * x - y * y).sqrt();
-                (*p, *q) = (x / up, y / up);
-            }
-        },
-    );
-}
-
-/// Rejects images without pixels or with a number of channels other than three.
-pub(crate) fn colour_image(image: ArrayView3<'_, u8>) -> Result<ArrayView3<'_, u8>, GelError> {
-    let (rows, columns, channels) = image.dim();
-    if rows == 0 || columns == 0 {
-        return Err(GelError::EmptyImage { rows, columns });
-    }
-    same_shape("channels", (1, 3), (1, channels))?;
-    Ok(image)
 }

@@ -7,6 +7,7 @@ use numpy::{
     PyReadonlyArrayDyn, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
+use tactile_files::sensor::GelPixels;
 
 /// Converts an argument with NumPy to `dtype`. Its kind of numbers must be one of `kinds`.
 fn read<'py, T: Element>(
@@ -117,18 +118,23 @@ pub(crate) fn frame<'py>(
     two_axes(name, given, "u", "uint8")
 }
 
-/// A colour frame with any order of channels: bytes, [row, column, channel].
-pub(crate) fn colours(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Array3<u8>> {
+/// A frame of a gel, of grey levels or colours with any order of channels: bytes.
+pub(crate) fn gel(name: &str, given: &Bound<'_, PyAny>) -> PyResult<GelPixels> {
     let array = bytes(name, given)?;
     let shape = array.shape().to_vec();
-    let wanted = "three axes (rows, columns, 3) of a gel lit in colours";
+    let levels = array.as_array().to_owned();
     match *shape.as_slice() {
-        [_, _, 3] => array
-            .as_array()
-            .to_owned()
-            .into_dimensionality()
-            .map_err(invalid),
-        _ => Err(axes(name, wanted, &shape)),
+        [_, _, 3] => Ok(GelPixels::Colour(
+            levels.into_dimensionality().map_err(invalid)?,
+        )),
+        [_, _] => Ok(GelPixels::Grey(
+            levels.into_dimensionality().map_err(invalid)?,
+        )),
+        _ => {
+            let wanted = "three axes (rows, columns, 3) of a gel lit in colours, or two of one \
+                          that darkens";
+            Err(axes(name, wanted, &shape))
+        }
     }
 }
 

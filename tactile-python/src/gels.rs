@@ -1,20 +1,21 @@
-//! Gels lit in colours, and markers printed on gels, from arrays.
+//! Gel sensors, and markers printed on gels, from arrays.
 use crate::arrays::{self, Matrix, kept};
 use crate::errors::{self, TactileError, invalid};
 use crate::results::{Estimate, GelContact, GelReport, Markers, of_values};
-use ndarray::{Array2, Array3, ArrayView3, s};
+use ndarray::{Array2, Array3, s};
 use numpy::{PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 use std::path::PathBuf;
-use tactile_files::sensor::{CalibratedGel, PhotometricPresses, PhotometricSensor};
+use tactile_files::io::Grey;
+use tactile_files::sensor::{CalibratedGel, GelFile, GelPixels, GelPresses};
 use tactile_imaging::gel::{
-    BallPress, CalibrationReport, FrameDoubt, GaugeForce, GelError, GelFrame as Frame, GelLaw,
-    GelLayer, GelSensor as Gel, find_markers, track_markers,
+    BallPress, CalibrationReport, DarkModel, FrameDoubt, GaugeForce, GelError, GelFrame as Frame,
+    GelImage, GelLaw, GelLayer, GelSensor as Gel, find_markers, track_markers,
 };
 use tactile_imaging::matching::MatchError;
 
-/// A gel lit in colours: from frames to surface, contacts and forces.
+/// A gel sensor, lit in colours or darkening: from frames to surface, contacts and forces.
 #[pyclass(frozen, module = "tactile_imaging")]
 pub(crate) struct GelSensor {
     gel: CalibratedGel,
@@ -48,11 +49,11 @@ impl Order {
         }
     }
 
-    /// Channels as red, green and blue.
-    fn rgb<'a>(self, frame: ArrayView3<'a, u8>) -> ArrayView3<'a, u8> {
-        match self {
-            Self::Rgb => frame,
-            Self::Bgr => frame.slice_move(s![.., .., ..;-1]),
+    /// Channels as red, green and blue. Grey levels have no order.
+    fn rgb<'a>(self, frame: &'a GelPixels) -> GelImage<'a> {
+        match (self, frame.view()) {
+            (Self::Bgr, GelImage::Colour(levels)) => levels.slice_move(s![.., .., ..;-1]).into(),
+            (_, image) => image,
         }
     }
 
@@ -77,9 +78,9 @@ impl GelSensor {
     ///
     /// Parameters
     /// ----------
-    /// reference : (rows, columns, 3) array of uint8
-    ///     Frame without contact.
-    /// presses : sequence of (rows, columns, 3) arrays of uint8
+    /// reference : (rows, columns, 3) or (rows, columns) array of uint8
+    ///     Frame without contact, in colours, or in grey levels for a gel that darkens.
+    /// presses : sequence of arrays of the shape of reference
     ///     Five to twenty frames of the ball at different positions.
     /// ball_radius : float or (n,) array
     ///     Radius of the ball, or of the ball of each press, in metres.
@@ -113,12 +114,10 @@ impl GelSensor {
     ) -> PyResult<Self> {
         let order = Order::named(order)?;
         let gauge = gauge.unwrap_or_default().into_iter();
-        let gauge = gauge.map(|(frame, force)| Ok((arrays::colours("gauge", &frame)?, force)));
+        let gauge = gauge.map(|(frame, force)| Ok((arrays::gel("gauge", &frame)?, force)));
         let gauge = gauge.collect::<PyResult<Vec<_>>>()?;
-        let reference = arrays::colours("reference", reference)?;
-        let frames = presses
-            .iter()
-            .map(|frame| arrays::colours("presses", frame));
+        let reference = arrays::gel("reference", reference)?;
+        let frames = presses.iter().map(|frame| arrays::gel("presses", frame));
         let frames = frames.collect::<PyResult<Vec<_>>>()?;
         let radii = match ball_radius.extract::<f64>() {
             Ok(radius) => vec![radius; frames.len()],
@@ -139,18 +138,16 @@ impl GelSensor {
         });
         let found = py.detach(|| {
             let press = |k: usize| BallPress {
-                frame: order.rgb(frames[k].view()),
-                ball_radius_m: radii[k],
                 circle_px: (circles.as_ref())
                     .map(|circles| circles[k])
                     .filter(|circle| circle.iter().all(|v| !v.is_nan())),
+                ..BallPress::new(order.rgb(&frames[k]), radii[k])
             };
             let presses: Vec<_> = (0..frames.len()).map(press).collect();
-            let (sensor, report) =
-                Gel::calibrate(order.rgb(reference.view()), pixel_size, &presses)?;
+            let (sensor, report) = Gel::calibrate(order.rgb(&reference), pixel_size, &presses)?;
             let readings = gauge
                 .iter()
-                .map(|(frame, force)| Ok((sensor.read(order.rgb(frame.view()))?, *force)));
+                .map(|(frame, force)| Ok((sensor.read(order.rgb(frame))?, *force)));
             let readings = readings.collect::<Result<Vec<_>, GelError>>()?;
             let pairs: Vec<_> = readings
                 .iter()
@@ -162,6 +159,7 @@ impl GelSensor {
             Ok((
                 CalibratedGel {
                     sensor,
+                    grey: Grey::default(),
                     layer,
                     gauge,
                 },
@@ -183,10 +181,42 @@ impl GelSensor {
         order: &str,
     ) -> PyResult<Self> {
         let order = Order::named(order)?;
-        let presses = PhotometricPresses::read(path).map_err(errors::file)?;
+        let presses = GelPresses::read(path).map_err(errors::file)?;
         let found = py.detach(|| presses.calibrate());
         let (gel, report) = found.map_err(errors::refused)?;
-        Self::new(py, gel, order, Some(report))
+        Self::new(py, gel, order, report)
+    }
+
+    /// A sensor of a gel that darkens, from a table of darkness and depth.
+    ///
+    /// Parameters
+    /// ----------
+    /// reference : (rows, columns) array of uint8
+    ///     Frame without contact.
+    /// table : (n, 2) array
+    ///     Darkness in grey levels and depth in metres. Both increase. No darkness is no depth: a
+    ///     table without the row 0, 0 is shifted.
+    /// pixel_size : float
+    ///     Size of a pixel on the gel in metres.
+    #[classmethod]
+    #[pyo3(signature = (reference, table, *, pixel_size))]
+    fn darkening(
+        _class: &Bound<'_, PyType>,
+        py: Python<'_>,
+        reference: &Bound<'_, PyAny>,
+        table: &Bound<'_, PyAny>,
+        pixel_size: f64,
+    ) -> PyResult<Self> {
+        let reference = arrays::gel("reference", reference)?;
+        let table = arrays::columns::<2>("table", table)?;
+        let sensor = Gel::new(DarkModel::new(pixel_size, table), reference.view());
+        let gel = CalibratedGel {
+            sensor: sensor.map_err(errors::refused)?,
+            grey: Grey::default(),
+            layer: None,
+            gauge: None,
+        };
+        Self::new(py, gel, Order::Rgb, None)
     }
 
     /// Reads a sensor file written by `save` or `tactile calibrate`.
@@ -199,7 +229,7 @@ impl GelSensor {
         order: &str,
     ) -> PyResult<Self> {
         let order = Order::named(order)?;
-        let gel = PhotometricSensor::read(path).map_err(errors::file)?;
+        let gel = GelFile::read(path).map_err(errors::file)?;
         Self::new(py, gel, order, None)
     }
 
@@ -216,9 +246,9 @@ impl GelSensor {
     ///     The frame does not come from this sensor: black, white, noise, rotated, of another unit,
     ///     or with another order of channels.
     fn read(&self, py: Python<'_>, frame: &Bound<'_, PyAny>) -> PyResult<GelFrame> {
-        let frame = arrays::colours("frame", frame)?;
+        let frame = arrays::gel("frame", frame)?;
         let found = py.detach(|| {
-            let frame = self.gel.sensor.read(self.order.rgb(frame.view()))?;
+            let frame = self.gel.sensor.read(self.order.rgb(&frame))?;
             let forces = self
                 .law
                 .as_ref()
@@ -245,7 +275,7 @@ impl GelSensor {
     /// Size of a pixel on the gel in metres.
     #[getter]
     fn pixel_size(&self) -> f64 {
-        self.gel.sensor.model().pixel_size_m
+        self.gel.sensor.pixel_size_m()
     }
 
     /// Rows and columns of its frames.
@@ -291,8 +321,8 @@ impl GelSensor {
                     text: format!("normals of presses left out {angle:.2}° off in the median"),
                     circles: kept(py, circles),
                     median_angle: angle,
-                    slope_error: model.slope_standard_error,
-                    depth_error: model.depth_standard_error_m,
+                    slope_error: model.slope_standard_error(),
+                    depth_error: model.depth_standard_error_m(),
                     flags: report.doubts.iter().map(ToString::to_string).collect(),
                 },
             )

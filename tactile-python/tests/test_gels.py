@@ -1,4 +1,4 @@
-"""Gels that are lit in colours, and markers: from arrays."""
+"""Gels lit in colours or darkening, and markers: from arrays."""
 
 import numpy as np
 import pytest
@@ -148,3 +148,45 @@ def test_markers_move_as_the_gel_does():
     assert np.array_equal(ti.markers(colours, colours).positions, found.positions)
     with pytest.raises(ti.TactileError, match="no markers"):
         ti.markers(np.full((40, 40), 90, np.uint8), np.full((40, 40), 90, np.uint8))
+
+
+def darkened(depth, seed=0):
+    """A gel that darkens by 90 levels per millimetre, with noise of one level."""
+    noise = np.random.default_rng(seed).normal(0, 1, depth.shape)
+    return np.clip(np.round(180 - 90 * depth + noise), 0, 255).astype(np.uint8)
+
+
+def dent(x, y, contact, ball=4.0):
+    """A ball of 4 mm in contact up to `contact` mm, and a dent that decays outside, in mm."""
+    rows, columns = np.mgrid[:ROWS, :COLUMNS]
+    r = 1e3 * PIXEL * np.hypot(columns - x, rows - y)
+    rim = np.sqrt(ball**2 - contact**2)
+    around = 0.6 * contact / rim
+    inside = around + np.sqrt(np.maximum(ball**2 - r**2, 0)) - rim
+    return np.where(r < contact, inside, around * np.exp(-(r - contact) / 0.6))
+
+
+def test_a_gel_that_darkens_is_calibrated_by_balls_or_a_table(tmp_path):
+    places = np.random.default_rng(3).uniform([80, 70, 1.0], [120, 90, 2.0], (8, 3))
+    flat = darkened(np.zeros((ROWS, COLUMNS)))
+    frames = [darkened(dent(*place), k + 1) for k, place in enumerate(places)]
+    gauge = [(frame, place[2] ** 3) for frame, place in zip(frames, places)]
+    by_balls = ti.GelSensor.calibrate(
+        flat, frames, ball_radius=4e-3, pixel_size=PIXEL, gauge=gauge
+    )
+    assert by_balls.report.flags == []
+    by_table = ti.GelSensor.darkening(flat, [[0, 0], [90, 1e-3]], pixel_size=PIXEL)
+    truth = dent(100, 80, 1.4)
+    for sensor in (by_balls, by_table):
+        (contact,) = sensor.read(darkened(truth, 50)).contacts
+        assert contact.depth_below_far.value == pytest.approx(1e-3 * truth.max(), abs=2.5e-5)
+    assert by_table.read(frames[0]).force is None
+    force = by_balls.read(darkened(truth, 51)).force
+    assert abs(force.value - 1.4**3) < 3 * force.standard_error
+    by_balls.save(tmp_path / "dark.toml")
+    loaded = ti.GelSensor.load(tmp_path / "dark.toml")
+    assert loaded.read(frames[0]).force.value == by_balls.read(frames[0]).force.value
+    with pytest.raises(ti.TactileError, match="grey levels are needed"):
+        by_table.read(lit(np.zeros((ROWS, COLUMNS))))
+    with pytest.raises(ti.TactileError, match="the frame is black"):
+        by_table.read(np.zeros((ROWS, COLUMNS), np.uint8))

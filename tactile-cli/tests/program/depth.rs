@@ -34,7 +34,7 @@ fn the_grey_and_the_zero_are_those_of_the_table() {
         let output = run(folder.path(), &words(&call));
         let value = value(&output);
         assert_keeps_to_schema(&value, &call);
-        1e3 * value["frames"][0]["contact"]["surface"]["largest_depth_m"]
+        1e3 * value["frames"][0]["contact"]["depth_below_far_m"]["value"]
             .as_f64()
             .unwrap()
     };

@@ -29,7 +29,8 @@ const TINTED_SHARE: f64 = 1e-3;
 /// assert_eq!((levels(Grey::Mean)?, levels(Grey::default())?), (30, 10));
 /// # Ok(()) }
 /// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Grey {
     /// The luma of Rec. 601, 0.299 R + 0.587 G + 0.114 B, as in OpenCV and most camera software.

@@ -39,13 +39,13 @@
 mod calibration;
 mod file;
 mod findings;
+mod gel;
 mod input;
 mod layers;
-mod photometric;
 mod target;
 
 pub use calibration::CalibratedSensor;
 pub use file::{Sensor, SensorGeometry};
 pub use findings::{LayerFinding, PressFinding, SensorError};
+pub use gel::{CalibratedGel, GelFile, GelPixels, GelPresses};
 pub use input::{Indenter, LayerInput, SensorCalibration, SensorPress};
-pub use photometric::{CalibratedGel, PhotometricPresses, PhotometricSensor};

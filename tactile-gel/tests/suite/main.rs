@@ -1,5 +1,6 @@
 //! The tests of `tactile-gel`, in a single program.
 
+mod dark;
 mod markers;
 mod measured;
 mod other_frames;

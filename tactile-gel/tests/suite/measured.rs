@@ -64,14 +64,12 @@ fn presses_held_back_have_their_ball() {
     for half in [0, 1] {
         let of = |k: usize| presses.iter().skip(k).step_by(2);
         let given = of(half).map(|(frame, circle)| BallPress {
-            frame: frame.view(),
+            frame: frame.into(),
             ball_radius_m: BALL_PX * PIXEL_M,
             circle_px: Some(*circle),
         });
         let given: Vec<_> = given.collect();
-        let sensor = GelSensor::calibrate(reference.view(), PIXEL_M, &given)
-            .unwrap()
-            .0;
+        let sensor = GelSensor::calibrate(&reference, PIXEL_M, &given).unwrap().0;
         for (frame, circle) in of(1 - half) {
             let (angle, height) = misses(&sensor.read(frame.view()).unwrap(), *circle);
             println!("{circle:?}: {angle:.2}°, {height:.4} mm");

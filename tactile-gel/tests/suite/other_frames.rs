@@ -28,7 +28,7 @@ fn frames_of_others_are_named() {
     for seed in [1, 2] {
         let frame = pressed(&gel, seed);
         let named = |name: &str, frame: &Array3<u8>, wanted: &dyn Fn(&FrameDoubt) -> bool| {
-            let found = sensor.read(frame.view()).unwrap();
+            let found = sensor.read(frame).unwrap();
             assert!(
                 found.doubts.iter().any(wanted),
                 "{name}: {:?}",
@@ -148,11 +148,7 @@ fn a_wrong_ball_is_doubted() {
     let exchanged = of(&reference, |r, c, k| (r, c, 2 - k));
     let presses: Vec<_> = frames
         .iter()
-        .map(|frame| BallPress {
-            frame: frame.view(),
-            ball_radius_m: BALL_PX * PIXEL_M,
-            circle_px: None,
-        })
+        .map(|frame| BallPress::new(frame, BALL_PX * PIXEL_M))
         .collect();
     let refused = GelSensor::calibrate(exchanged.view(), PIXEL_M, &presses);
     assert!(

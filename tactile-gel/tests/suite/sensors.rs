@@ -49,11 +49,7 @@ pub(crate) fn calibrated_with(
 ) -> (GelSensor, CalibrationReport) {
     let presses: Vec<_> = frames
         .iter()
-        .map(|frame| BallPress {
-            frame: frame.view(),
-            ball_radius_m,
-            circle_px: None,
-        })
+        .map(|frame| BallPress::new(frame, ball_radius_m))
         .collect();
     GelSensor::calibrate(reference.view(), PIXEL_M, &presses).unwrap()
 }

@@ -31,7 +31,7 @@ fn areas_depths_and_forces_are_those_of_exact_worlds() {
     let (sensor, report) = calibrated(&gel);
     println!(
         "{:?} {:?} {:?}",
-        sensor.model().slope_standard_error,
+        sensor.model().slope_standard_error(),
         report.face,
         report.doubts
     );
@@ -203,7 +203,7 @@ fn a_wrong_circle_is_named() {
         .iter()
         .enumerate()
         .map(|(k, frame)| BallPress {
-            frame: frame.view(),
+            frame: frame.into(),
             ball_radius_m: BALL_PX * PIXEL_M,
             circle_px: drawn(k),
         })
@@ -211,7 +211,7 @@ fn a_wrong_circle_is_named() {
     let (other, report) = GelSensor::calibrate(flat(&gel, 0).view(), PIXEL_M, &given).unwrap();
     let wrong: Vec<_> = (0..12).filter(|k| report.circles[*k].wrong).collect();
     assert_eq!(wrong, [4]);
-    let [a, b] = [&sensor, &other].map(|s| s.model().normal_standard_error);
+    let [a, b] = [&sensor, &other].map(|s| s.model().slope_standard_error());
     assert!((a / b - 1.0).abs() < 0.5, "{a} {b}");
 }
 
@@ -230,7 +230,7 @@ fn a_gauge_gives_forces_without_a_layer() {
         let press = HertzPress::ball(at, 60.0, radius);
         let frame = gel.frame(&face.depth_px(gel.shape, &[press]), 700 + k as u64);
         let force = press.force_n(MODULUS_PA, PIXEL_M);
-        (sensor.read(frame.view()).unwrap(), force)
+        (sensor.read(&frame).unwrap(), force)
     };
     let given: Vec<_> = (0..12).map(|k| read(k, 10.0 + 1.8 * k as f64)).collect();
     let readings: Vec<(&GelFrame, f64)> = given.iter().map(|(frame, f)| (frame, *f)).collect();

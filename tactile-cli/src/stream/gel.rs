@@ -1,13 +1,15 @@
-//! `tactile stream` with a gel lit in colours: force, contact and depth live.
+//! `tactile stream` with a gel sensor: force, contact and depth live.
 use super::StreamArguments;
 use super::watch::{Meter, Watch, listed, watch};
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
-use crate::photometric::{GelReading, NO_FRAMES, Reader, number_or_error};
+use crate::frames::Pixels;
+use crate::gel::{GelReading, NO_FRAMES, Reader, number_or_error};
 use crate::relief::HeightGrid;
 use ndarray::{Array2, Array3};
 use serde_json::{Value, json};
 use std::error::Error;
+use std::marker::PhantomData;
 use std::path::Path;
 use tactile_imaging::core::Estimate;
 use tactile_imaging::gel::FrameDoubt;
@@ -30,14 +32,15 @@ fn pair(of: Estimate) -> [f64; 2] {
     [of.value, of.standard_error]
 }
 
-/// A sensor with the depth in the last frame.
-struct Gel {
+/// A sensor of frames `P`, with the depth in the last one.
+struct Gel<P> {
     reader: Reader,
     depth_m: Array2<f64>,
+    frames: PhantomData<P>,
 }
 
-impl Meter for Gel {
-    type Frame = Array3<u8>;
+impl<P: Pixels> Meter for Gel<P> {
+    type Frame = P;
     type Row = Row;
 
     fn heading(&self) -> String {
@@ -47,8 +50,8 @@ impl Meter for Gel {
     const COLUMNS: &'static str =
         "force_N,force_error_N,contact_area_m2,largest_depth_m,largest_depth_error_m";
 
-    fn measure(&mut self, frame: &Array3<u8>) -> Result<Row, Box<dyn Error>> {
-        let reading = self.reader.stereo.read(frame.view())?;
+    fn measure(&mut self, frame: &P) -> Result<Row, Box<dyn Error>> {
+        let reading = self.reader.sensor.read(frame.image())?;
         let row = Row {
             force_n: self.reader.force(&reading),
             contact: GelReading::of(&reading),
@@ -95,20 +98,33 @@ impl Meter for Gel {
     }
 
     fn surface(&mut self) -> Value {
-        let size = 1e3 * self.reader.stereo.model().pixel_size_m;
+        let size = 1e3 * self.reader.sensor.pixel_size_m();
         let relief = HeightGrid::of(self.depth_m.mapv(|z| 1e3 * z).view(), [size; 2]);
         json!({ "name": "depth", "relief": relief })
     }
 }
 
-/// Measures frames of a gel lit in colours.
-pub(super) fn coloured(
+/// Measures frames of a gel sensor.
+pub(super) fn gel(
+    sensor: &Path,
+    arguments: &StreamArguments,
+    context: &mut Context,
+) -> Result<Exit, Failure> {
+    let reader = Reader::open(sensor)?;
+    match reader.has_colours() {
+        true => live::<Array3<u8>>(reader, sensor, arguments, context),
+        false => live::<Array2<u8>>(reader, sensor, arguments, context),
+    }
+}
+
+fn live<P: Pixels>(
+    reader: Reader,
     sensor: &Path,
     arguments: &StreamArguments,
     context: &mut Context,
 ) -> Result<Exit, Failure> {
     if arguments.strain {
-        let sentence = "--strain is not available for a gel lit in colours";
+        let sentence = "--strain is not available for a gel sensor";
         return Err(Failure::input(sentence));
     }
     let frames = listed(&arguments.frames)?;
@@ -119,11 +135,11 @@ pub(super) fn coloured(
     if let Some(report) = &mut context.outputs.report {
         report.inputs(frames.iter().cloned());
     }
-    let reader = Reader::open(sensor)?;
     let reading = reader.reading(sensor);
-    let gel = Gel {
+    let gel = Gel::<P> {
         reader,
         depth_m: Array2::default((0, 0)),
+        frames: PhantomData,
     };
     let mut live = Watch::new(gel, arguments, context)?;
     watch(&mut live, &frames, reading, arguments.rate, context)?;

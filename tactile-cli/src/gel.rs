@@ -1,21 +1,25 @@
-//! `tactile calibrate` and `tactile depth` for gels lit in colours.
+//! Gel sensors, lit in colours or darkening: `tactile calibrate` and `tactile depth` for them.
 use crate::console::Context;
 use crate::failure::{Exit, Failure};
-use crate::frames::{NamedFrame, Reading};
+use crate::frames::{NamedFrame, Pixels, Reading};
 use crate::mesh;
 use crate::outputs::{Csv, Npz, beside};
-use crate::plot::{Colour, HeatMap, Page, Panel};
+use crate::plot::{Colour, HeatMap, Page, Panel, circle};
 use crate::text::{four_digits, in_unit};
 use clap::Arg;
 use clap::builder::ArgPredicate;
-use ndarray::Array3;
+use ndarray::{Array2, Array3};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use tactile_files::io::{Grey, read_bytes};
-use tactile_files::sensor::{PhotometricPresses, PhotometricSensor};
+use tactile_files::sensor::{GelFile, GelPresses};
 use tactile_imaging::core::Estimate;
-use tactile_imaging::gel::{BallFace, CalibrationReport, GelContact, GelFrame, GelLaw, GelSensor};
+use tactile_imaging::gel::{
+    BallFace, CalibrationReport, GelContact, GelFrame, GelImage, GelLaw, GelModel, GelSensor,
+};
+use tactile_imaging::pipeline::BallFit;
+use tactile_imaging::sfs::Domain;
 
 /// An argument that a sensor file replaces. `filler` is parsed but not used.
 pub(crate) fn unless_sensor(arg: Arg, filler: &'static str) -> Arg {
@@ -31,16 +35,36 @@ pub(crate) fn calibrate(
     sensor: &Path,
     context: &mut Context,
 ) -> Result<Exit, Failure> {
-    let presses = PhotometricPresses::read(path)?;
+    let presses = GelPresses::read(path)?;
     let reference = reference_name(sensor, &presses.reference_path);
     if let Some(folder) = context.outputs.folder().map(Path::to_path_buf) {
         context.outputs.plan_in(&folder, &[&reference], &[path])?;
     }
     let found = presses.calibrate();
     let (calibrated, found) = found.map_err(|error| Failure::in_file(path, error))?;
-    print(&presses.names, &calibrated.sensor, &found, context);
-    for doubt in &found.doubts {
-        context.warn(doubt.kind(), json!({}), doubt);
+    let model = calibrated.sensor.model();
+    let mut value = json!({ "gel": calibrated.layer, "gauge": calibrated.gauge });
+    match &found {
+        Some(found) => {
+            print(&presses.names, &calibrated.sensor, found, context);
+            for doubt in &found.doubts {
+                context.warn(doubt.kind(), json!({}), doubt);
+            }
+            let pairs = presses.names.iter().zip(&found.circles);
+            let circles: Vec<Value> = pairs
+                .map(|(name, circle)| json!({ "image": name.display().to_string(), "circle": circle }))
+                .collect();
+            value["presses"] = json!(circles);
+            value["offset_px"] = json!(found.offset_px);
+            value["median_angle_deg"] = json!(found.median_angle_deg);
+            value["face"] = json!(found.face);
+            value["depth_standard_error_m"] = json!(model.depth_standard_error_m());
+            value["slope_standard_error"] = json!(model.slope_standard_error());
+            if let GelModel::Colour(model) = model {
+                value["normal_standard_error"] = json!(model.normal_standard_error);
+            }
+        }
+        None => context.line("sensor of a gel that darkens, from a table of depths"),
     }
     if let Some(gel) = &calibrated.layer {
         let modulus = Estimate::new(gel.youngs_modulus_pa, gel.youngs_modulus_error_pa);
@@ -51,23 +75,9 @@ pub(crate) fn calibrate(
         let law = format!("force as volume to the power {exponent}, readings off by {scatter} %");
         context.row("gauge", law);
     }
-    let model = calibrated.sensor.model();
-    let circles: Vec<Value> = presses
-        .names
-        .iter()
-        .zip(&found.circles)
-        .map(|(name, circle)| json!({ "image": name.display().to_string(), "circle": circle }))
-        .collect();
-    context.value(&json!({
-        "presses": circles, "offset_px": found.offset_px,
-        "median_angle_deg": found.median_angle_deg,
-        "normal_standard_error": model.normal_standard_error,
-        "depth_standard_error_m": model.depth_standard_error_m,
-        "slope_standard_error": model.slope_standard_error, "face": found.face, "gel": calibrated.layer,
-        "gauge": calibrated.gauge,
-    }));
+    context.value(&value);
     if context.outputs.folder().is_some() {
-        let text = PhotometricSensor::of(&reference, &calibrated).to_toml();
+        let text = GelFile::of(&reference, &calibrated).to_toml();
         let text = text.map_err(Failure::output)?;
         context.outputs.add(sensor, text.into_bytes());
         context
@@ -88,23 +98,27 @@ fn print(names: &[PathBuf], sensor: &GelSensor, found: &CalibrationReport, conte
         .circles
         .iter()
         .filter(|circle| circle.used_px.is_some());
+    let model = sensor.model();
+    let kind = match model {
+        GelModel::Dark(_) => "sensor of a gel that darkens",
+        _ => "sensor lit in colours",
+    };
     context.line(format_args!(
-        "sensor lit in colours, from {} of {} presses:",
+        "{kind}, from {} of {} presses:",
         used.count(),
         names.len()
     ));
-    let model = sensor.model();
     let angle = four_digits(found.median_angle_deg);
     context.row(
         "normals",
         format_args!("{angle}° off in the median press left out"),
     );
-    let depth = four_digits(1e3 * model.depth_standard_error_m);
+    let depth = four_digits(1e3 * model.depth_standard_error_m());
     context.row(
         "depth",
         format_args!("{depth} mm, standard error of a pixel of presses left out"),
     );
-    let slope = four_digits(1e2 * model.slope_standard_error);
+    let slope = four_digits(1e2 * model.slope_standard_error());
     context.row(
         "slopes",
         format_args!("{slope} %, standard error of all slopes of a press left out"),
@@ -148,26 +162,47 @@ pub(crate) const NO_FRAMES: &str =
 
 /// A sensor with its force law, or the reason why there is none.
 pub(crate) struct Reader {
-    pub stereo: GelSensor,
+    pub sensor: GelSensor,
     pub law: Result<GelLaw, String>,
+    /// Conversion of colours to grey, for a gel that darkens.
+    pub grey: Grey,
+    pub bits: Option<u8>,
 }
 
 impl Reader {
     pub(crate) fn open(sensor: &Path) -> Result<Self, Failure> {
-        let gel = PhotometricSensor::read(sensor)?;
+        let gel = GelFile::read(sensor)?;
         let law = gel.law().map_err(|error| error.to_string());
-        let law = law.and_then(|law| law.ok_or_else(|| NO_GEL.to_owned()));
-        let stereo = gel.sensor;
-        Ok(Self { stereo, law })
+        Ok(Self {
+            law: law.and_then(|law| law.ok_or_else(|| NO_GEL.to_owned())),
+            sensor: gel.sensor,
+            grey: gel.grey,
+            bits: None,
+        })
     }
 
-    /// The options for reading its frames.
-    pub(crate) fn reading<'a>(&self, sensor: &'a Path) -> Reading<'a> {
+    /// A sensor without a law of forces.
+    pub(crate) fn of(sensor: GelSensor, grey: Grey, bits: Option<u8>) -> Self {
+        let law = Err(NO_GEL.to_owned());
+        Self {
+            sensor,
+            law,
+            grey,
+            bits,
+        }
+    }
+
+    pub(crate) fn has_colours(&self) -> bool {
+        matches!(self.sensor.reference(), GelImage::Colour(_))
+    }
+
+    /// How its frames are read, to the size of a reference.
+    pub(crate) fn reading<'a>(&self, reference: &'a Path) -> Reading<'a> {
         Reading {
-            grey: Grey::default(),
-            bits: None,
-            reference: sensor,
-            size: self.stereo.shape(),
+            grey: self.grey,
+            bits: self.bits,
+            reference,
+            size: self.sensor.shape(),
         }
     }
 
@@ -194,18 +229,6 @@ pub(crate) fn number_or_error(force: &Result<Option<Estimate>, String>) -> Value
     }
 }
 
-/// Reads depth, contact and force of frames with a sensor file, and writes the files of `depth`.
-pub(crate) fn measure(
-    sensor: &Path,
-    frames: &[PathBuf],
-    context: &mut Context,
-) -> Result<Exit, Failure> {
-    if frames.is_empty() {
-        return Err(Failure::in_file(sensor, NO_FRAMES));
-    }
-    depth(sensor, frames, true, context)
-}
-
 /// Suffixes of the files of a frame.
 const SUFFIXES: [&str; 7] = [
     "_depth.csv",
@@ -217,30 +240,86 @@ const SUFFIXES: [&str; 7] = [
     "_depth.svg",
 ];
 
-/// Reads gradients, face and contacts of frames with a sensor file, and their forces if `forces` is
-/// set.
-pub(crate) fn depth(
+/// A ball that is fitted to the depth of the first contact.
+#[derive(Clone, Copy)]
+pub(crate) enum Ball {
+    Any,
+    OfRadius(f64),
+}
+
+/// What is measured besides face and contacts.
+#[derive(Clone, Copy)]
+pub(crate) struct Wanted {
+    pub forces: bool,
+    pub ball: Option<Ball>,
+}
+
+/// Measures frames with a sensor file, with forces and without a ball.
+pub(crate) fn measure(
     sensor: &Path,
     frames: &[PathBuf],
-    forces: bool,
     context: &mut Context,
 ) -> Result<Exit, Failure> {
-    let reader = Reader::open(sensor)?;
-    let stereo = &reader.stereo;
-    let size = stereo.model().pixel_size_m;
-    let source = reader.reading(sensor);
-    let (images, unreadable) = source.all::<Array3<u8>>(frames, context)?;
+    if frames.is_empty() {
+        return Err(Failure::in_file(sensor, NO_FRAMES));
+    }
+    let wanted = Wanted {
+        forces: true,
+        ball: None,
+    };
+    depth(
+        &Reader::open(sensor)?,
+        sensor,
+        &[sensor],
+        frames,
+        wanted,
+        context,
+    )
+}
+
+/// Reads gradients, face and contacts of frames. `reference` is compared with the frames, and
+/// `inputs` are the other files that must not be overwritten.
+pub(crate) fn depth(
+    reader: &Reader,
+    reference: &Path,
+    inputs: &[&Path],
+    frames: &[PathBuf],
+    wanted: Wanted,
+    context: &mut Context,
+) -> Result<Exit, Failure> {
+    let source = reader.reading(reference);
+    let inputs = frames
+        .iter()
+        .map(PathBuf::as_path)
+        .chain(inputs.iter().copied());
+    let inputs: Vec<&Path> = inputs.collect();
+    if reader.has_colours() {
+        let images = source.all::<Array3<u8>>(frames, context)?;
+        depth_of(reader, images, &inputs, wanted, context)
+    } else {
+        let images = source.all::<Array2<u8>>(frames, context)?;
+        depth_of(reader, images, &inputs, wanted, context)
+    }
+}
+
+fn depth_of<P: Pixels>(
+    reader: &Reader,
+    (images, unreadable): (Vec<NamedFrame<P>>, usize),
+    inputs: &[&Path],
+    Wanted { forces, ball }: Wanted,
+    context: &mut Context,
+) -> Result<Exit, Failure> {
+    let size = reader.sensor.pixel_size_m();
     let mut exit = Exit::complete_if(unreadable == 0);
     let names = images
         .iter()
         .flat_map(|image| SUFFIXES.map(|suffix| image.file(suffix)));
     let names: Vec<_> = names.collect();
-    let inputs: Vec<&Path> = (frames.iter().map(PathBuf::as_path).chain([sensor])).collect();
-    context.outputs.plan(&names, &inputs)?;
+    context.outputs.plan(&names, inputs)?;
     let mut values = Vec::new();
     for (image, names) in images.iter().zip(names.chunks(SUFFIXES.len())) {
         let NamedFrame { name, pixels, .. } = image;
-        let reading = stereo.read(pixels.view());
+        let reading = reader.sensor.read(pixels.image());
         let reading = reading.map_err(|error| Failure::in_file(Path::new(name), error))?;
         context.line(format_args!("{name}:"));
         let contacts = contacts(&reading, &reader.forces(&reading), forces);
@@ -253,6 +332,16 @@ pub(crate) fn depth(
         let mut value = json!({
             "frame": name, "contact": contacts.first(), "contacts": contacts,
         });
+        let fit = ball
+            .filter(|_| !contacts.is_empty())
+            .map(|ball| fitted(&reading, size, ball));
+        if let Some(fit) = &fit {
+            value["ball"] = print_ball(fit.as_ref(), context);
+            if fit.is_none() {
+                exit = Exit::Partial;
+            }
+        }
+        let fit = fit.flatten();
         if reading.is_refused() {
             exit = Exit::Partial;
         }
@@ -268,6 +357,19 @@ pub(crate) fn depth(
             value["force_n"] = Value::Null;
         }
         values.push(value);
+        if let Some(report) = context
+            .outputs
+            .report
+            .as_mut()
+            .filter(|_| !reading.is_refused())
+        {
+            let heights_mm = reading.depth_m.mapv(|z| 1e3 * z);
+            report.surface(
+                &format!("depth in {name}"),
+                heights_mm.view(),
+                [1e3 * size; 2],
+            );
+        }
         if context.outputs.folder().is_none() || reading.is_refused() {
             continue;
         }
@@ -291,7 +393,8 @@ pub(crate) fn depth(
             arrays.add(name, "<f8", &shape, grid.iter().map(|v| v.to_le_bytes()))?;
         }
         context.outputs.add(&names[5], arrays.into_bytes()?);
-        context.outputs.page(&names[6], || page(&reading, size))?;
+        let page = || page(&reading, fit.as_ref(), size);
+        context.outputs.page(&names[6], page)?;
     }
     context.value(&json!({ "frames": values }));
     Ok(exit)
@@ -372,7 +475,72 @@ impl GelReading {
     }
 }
 
-fn page(reading: &GelFrame, size: f64) -> Page {
+/// The depth inside the first contact, NaN outside.
+fn first_contact(reading: &GelFrame) -> Array2<f64> {
+    let mut depth = reading.depth_m.clone();
+    depth.zip_mut_with(&reading.labels, |depth, label| {
+        if *label != 1 {
+            *depth = f64::NAN;
+        }
+    });
+    depth
+}
+
+fn fitted(reading: &GelFrame, size: f64, ball: Ball) -> Option<BallFit> {
+    let (depth, domain) = (first_contact(reading), Domain::new([size; 2]).ok()?);
+    match ball {
+        Ball::Any => BallFit::of_any_radius(depth.view(), &domain),
+        Ball::OfRadius(radius_m) => BallFit::of_radius(depth.view(), &domain, radius_m),
+    }
+}
+
+/// Prints the ball and returns it as JSON.
+fn print_ball(ball: Option<&BallFit>, context: &mut Context) -> Value {
+    let Some(ball) = ball else {
+        let reason = "no ball fits the depth";
+        context.row("ball", format_args!("none: {reason}"));
+        return json!({ "error": reason });
+    };
+    let depth_m = ball.depth_m(ball.centre_m);
+    let lengths = [
+        ball.radius_m,
+        depth_m,
+        ball.contact_radius_m,
+        ball.mean_absolute_error_m,
+    ];
+    let [radius, depth, contact, error] = lengths.map(|m| four_digits(1e3 * m));
+    let text = format!("of radius {radius} mm, {depth} mm deep, contact radius {contact} mm");
+    context.row("ball", text);
+    let text = format!("mean absolute error {error} mm over {} pixels", ball.pixels);
+    context.row("", text);
+    json!({
+        "radius_m": ball.radius_m, "centre_m": ball.centre_m,
+        "contact_radius_m": ball.contact_radius_m,
+        "depth_m": depth_m, "mean_absolute_error_m": ball.mean_absolute_error_m,
+        "pixels": ball.pixels,
+    })
+}
+
+/// Mean measured depth and depth of the ball as a function of the distance from the centre of the
+/// ball, in mm: distance, measured, ball.
+fn profile(depth_m: &Array2<f64>, size: f64, ball: &BallFit) -> Vec<[f64; 3]> {
+    // Twenty rings up to a fifth of the radius outside the contact.
+    let width = ball.contact_radius_m * 1.2 / 20.0;
+    let mut rings = [[0.0; 4]; 20];
+    for ((row, column), depth) in depth_m.indexed_iter() {
+        let [x, y] = [column as f64 * size, row as f64 * size];
+        let distance = (x - ball.centre_m[0]).hypot(y - ball.centre_m[1]);
+        if let Some(ring) = rings.get_mut((distance / width) as usize) {
+            let more = [1.0, distance, *depth, ball.depth_m([x, y])];
+            ring.iter_mut().zip(more).for_each(|(sum, v)| *sum += v);
+        }
+    }
+    let filled = rings.iter().filter(|ring| ring[0] > 0.0);
+    let mean = |[n, r, z, b]: &[f64; 4]| [r, z, b].map(|sum| 1e3 * sum / n);
+    filled.map(mean).collect()
+}
+
+fn page(reading: &GelFrame, ball: Option<&BallFit>, size: f64) -> Page {
     let depth = reading.depth_m.mapv(|z| 1e3 * z);
     let map = HeatMap::of_pixels(depth.view(), [1e3 * size; 2], "depth (mm)");
     let mut panel = Panel::new("Face", "x (mm)", "y (mm)").heat_map(map);
@@ -382,5 +550,22 @@ fn page(reading: &GelFrame, size: f64) -> Page {
         let name = if k == 0 { "contact" } else { "" };
         panel = panel.line(line, Colour::Orange, name);
     }
-    Page::new("Face of the gel", 1, vec![panel])
+    let mut panels = vec![panel];
+    if let Some(ball) = ball {
+        let centre = ball.centre_m.map(|m| 1e3 * m);
+        let rim = circle(centre, 1e3 * ball.contact_radius_m);
+        panels = vec![panels.remove(0).line(rim, Colour::Red, "ball's contact")];
+        let rings = profile(&reading.depth_m, size, ball);
+        let column = |k: usize| rings.iter().map(move |ring| [ring[0], ring[k]]);
+        let name = format!("ball of {} mm", four_digits(1e3 * ball.radius_m));
+        let cut = Panel::new(
+            "Depth around the centre",
+            "distance from the centre (mm)",
+            "depth (mm)",
+        )
+        .line(column(2), Colour::Blue, &name)
+        .rings(column(1), Colour::Red, "measured");
+        panels.push(cut);
+    }
+    Page::new("Face of the gel", panels.len(), panels)
 }
