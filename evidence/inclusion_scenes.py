@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Creates scenes of a tissue block with a spherical inclusion under the sensor's guide, solved by CalculiX (`ccx`, Debian's calculix-ccx).
 
-    evidence/inclusion_scenes.py FOLDER [--size MM] [--seed N] [--part K/N] [--spheroids] [NAMES ...]
+    evidence/inclusion_scenes.py FOLDER [--size MM] [--seed N] [--part K/N] [--spheroids] [--weak] [NAMES ...]
 
 writes FOLDER/scenes.csv and FOLDER/NAME.csv as `tactile-inclusion/examples/inclusion_study` reads them: 108 blocks with an
 inclusion, 32 plain ones, drawn from a fixed seed or N. With --spheroids the inclusions are drawn with heights over widths from 1/1.75 to 1.75
-and the diameter is that of the ball of equal volume. NAMES selects some scenes, and `--part` divides them into jobs. Existing files
+and the diameter is that of the ball of equal volume. With --weak they are alternately soft (0.2 to 0.7 of the tissue's modulus)
+and small (4 to 6 mm). NAMES selects some scenes, and `--part` divides them into jobs. Existing files
 are kept. A scene takes 5 to 30 s.
 
 Axisymmetric quadratic elements with reduced integration (CAX8R) at finite strain, compressible neo-Hooke
@@ -44,7 +45,7 @@ def half_axes(scene):
     return 0.5 * scene["D"] * scene["aspect"] ** (-1 / 3), 0.5 * scene["D"] * scene["aspect"] ** (2 / 3)
 
 
-def draw(seed, spheroids):
+def draw(seed, spheroids, weak):
     """The scenes: dictionaries of lengths in mm and moduli in kPa."""
     rng = random.Random(seed)
     scenes = []
@@ -69,6 +70,10 @@ def draw(seed, spheroids):
         scene.update(D=rng.uniform(6, 16), d=rng.uniform(2, 9))
         scene.update(E1=scene["E0"] * logarithmic(1.5, 15), nu=0.495)
         scene.update(aspect=logarithmic(1 / 1.75, 1.75) if spheroids else 1.0)
+        if weak and count % 2 == 0:
+            scene.update(E1=scene["E0"] * logarithmic(0.2, 0.7))
+        elif weak:
+            scene.update(D=rng.uniform(4, 6))
         half_width, half_height = half_axes(scene)
         if 2 * half_height + scene["d"] + 2.0 > scene["H"] or half_width > 0.6 * scene["R"]:
             continue
@@ -394,9 +399,10 @@ def main():
     parser.add_argument("--seed", type=int, default=20240613, help="of the draw: another one gives scenes that no constant was chosen on")
     parser.add_argument("--part", default="0/1", help="K/N: every N-th scene from the K-th")
     parser.add_argument("--spheroids", action="store_true", help="inclusions wider or taller than balls")
+    parser.add_argument("--weak", action="store_true", help="inclusions that are soft or small")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
-    part, parts, scenes = *map(int, options.part.split("/")), draw(options.seed, options.spheroids)
+    part, parts, scenes = *map(int, options.part.split("/")), draw(options.seed, options.spheroids, options.weak)
     wanted = [scene for scene in scenes if not options.names or scene["name"] in options.names]
     for scene in wanted[part::parts]:
         if not (options.folder / f"{scene['name']}.row").exists():

@@ -5,5 +5,5 @@ mod rings;
 #[cfg(test)]
 mod tests;
 
-pub use rings::{FaceCells, RingError, RingMeans, ring_means};
+pub use rings::{FaceCells, RingError, RingMeans, ring_means, rounding_error};
 pub use tactile_inclusion::*;

@@ -315,6 +315,49 @@ impl FaceCells {
     }
 }
 
+/// Standard error, in grey levels, of the mean of an image that was rounded to whole levels: the
+/// error of zero that such a reference frame gives to all pressures.
+///
+/// Of an even frame without noise every pixel has the same error, evenly distributed over a level.
+/// If the levels vary with standard deviation σ, from noise or light, the error averages out, with
+/// the variance
+///
+/// $$ \sum_{k \geq 1} \frac{e^{-4 \pi^2 k^2 \sigma^2}}{2 \pi^2 k^2} $$
+///
+/// σ is the median over squares of eight pixels. The result is zero if a value is not whole.
+///
+/// ```
+/// use tactile_imaging::inclusion::rounding_error;
+/// let even = ndarray::Array2::from_elem((40, 40), 7.0);
+/// assert!((rounding_error(&even.view()) - 1.0 / 12f64.sqrt()).abs() < 1e-3);
+/// let noisy = ndarray::Array2::from_shape_fn((40, 40), |(y, x)| ((7 * y + 5 * x) % 4) as f64);
+/// assert!(rounding_error(&noisy.view()) < 1e-6);
+/// ```
+pub fn rounding_error(image: &ArrayView2<'_, f64>) -> f64 {
+    if image.iter().any(|level| level.fract() != 0.0) {
+        return 0.0;
+    }
+    let variance = |square: ArrayView2<'_, f64>| square.var(0.0);
+    let mut variances: Vec<f64> = image
+        .exact_chunks((8, 8))
+        .into_iter()
+        .map(variance)
+        .collect();
+    if variances.is_empty() {
+        return 0.0;
+    }
+    let middle = variances.len() / 2;
+    let median = *variances.select_nth_unstable_by(middle, f64::total_cmp).1;
+    // Rounding itself adds a twelfth to the variance.
+    let variance = (median - 1.0 / 12.0).max(0.0);
+    let term = |k: u32| {
+        let wave = (core::f64::consts::TAU * f64::from(k)).powi(2);
+        2.0 * (-wave * variance).exp() / wave
+    };
+    // The terms left out sum to less than a thousandth of a twelfth.
+    (1..=1000).map(term).sum::<f64>().sqrt()
+}
+
 /// The value exceeded by one pixel in a hundred.
 fn high_value(image: &ArrayView2<'_, f64>) -> f64 {
     let mut values: Vec<f64> = image.iter().copied().filter(|v| v.is_finite()).collect();

@@ -52,7 +52,8 @@ The scene file:
   shape = \"block\"; height_m, radius_m; interface = \"bonded\" or \"frictionless\" (both are \
   tried if it is absent);
   height_error_m (2 % if absent), poisson_ratio and poisson_ratio_error (0.495, 0.005), \
-                        approach_error_m (2e-5),
+                        approach_error_m (2e-5, of their zero), \
+                        each_approach_error_m (0),
   youngs_modulus_pa and youngs_modulus_error_pa if the tissue's modulus is known
   [waveguide]
   radius_m; layers = [{ thickness_m, youngs_modulus_pa, poisson_ratio }], from the block's side to \
@@ -98,8 +99,7 @@ pub(crate) struct InclusionArguments {
 
 /// The input of a search, and the truth if it is known.
 struct Scan {
-    specimen: TissueBlock,
-    guide: Guide,
+    search: InclusionSearch,
     radii_m: Vec<f64>,
     profiles: Vec<PressureProfile>,
     /// First harmonic of the pressure around the axis relative to its mean, and the higher ones.
@@ -116,8 +116,7 @@ impl Scan {
         let loaded = scene.load().map_err(Failure::input)?;
         let (asymmetry, harmonics) = (loaded.asymmetry(), loaded.harmonics());
         Ok(Self {
-            specimen: scene.specimen,
-            guide: scene.guide.clone(),
+            search: loaded.search.clone(),
             radii_m: loaded.rings[0].radii_m.clone(),
             asymmetry,
             harmonics,
@@ -185,8 +184,7 @@ impl Scan {
             });
         let profiles = profiles.collect();
         Ok(Self {
-            specimen,
-            guide,
+            search: InclusionSearch::new(specimen, guide)?,
             radii_m,
             profiles,
             asymmetry: 0.0,
@@ -243,9 +241,7 @@ pub(crate) fn run(arguments: &InclusionArguments, context: &mut Context) -> Resu
         Some(scene) => Scan::of_scene(scene)?,
         None => Scan::simulated(arguments.seed).map_err(|error| unusable(file, &error))?,
     };
-    let search = InclusionSearch::new(scan.specimen, scan.guide.clone())
-        .map_err(|error| unusable(file, &error))?;
-    let estimate = match found(&search, &scan, context) {
+    let estimate = match found(&scan, context) {
         Ok(estimate) => estimate,
         Err(ElasticityError::Cancelled) => return Ok(Exit::Interrupted),
         Err(error @ ElasticityError::NoSolution) => return Err(Failure::no_answer(error)),
@@ -257,8 +253,8 @@ pub(crate) fn run(arguments: &InclusionArguments, context: &mut Context) -> Resu
     let mut hidden = None;
     if let (Some(contrast), Some(loaded)) = (arguments.hidden, &scan.loaded) {
         // The found inclusion is valid, even if the limits cannot be computed.
-        let face_m = scan.guide.radius_m();
-        match Hidden::new(&search, loaded, &scan.specimen, face_m, contrast, context) {
+        let found = context.reported("what could hide", |report| loaded.hidden(contrast, report));
+        match found.map(Hidden) {
             Ok(found) => {
                 found.print(context);
                 hidden = Some(found);
@@ -282,7 +278,7 @@ pub(crate) fn run(arguments: &InclusionArguments, context: &mut Context) -> Resu
         "inclusions": estimate.inclusions(),
         "block_modulus_pa": estimate.block_modulus_pa, "interface": estimate.interface,
         "misfit": estimate.misfit, "asymmetry": scan.asymmetry, "harmonics": scan.harmonics,
-        "is_asymmetric": is_asymmetric, "hidden": hidden,
+        "is_asymmetric": is_asymmetric, "hidden": hidden.as_ref().map(|hidden: &Hidden| &hidden.0),
     }));
     context.outputs.add(names[0], table(&estimate, &scan));
     context
@@ -298,14 +294,10 @@ fn unusable(file: Option<&Path>, error: &ElasticityError) -> Failure {
     }
 }
 
-fn found(
-    search: &InclusionSearch,
-    scan: &Scan,
-    context: &Context,
-) -> Result<InclusionEstimate, ElasticityError> {
+fn found(scan: &Scan, context: &Context) -> Result<InclusionEstimate, ElasticityError> {
     context.reported("searching", |report| match &scan.loaded {
-        Some(loaded) => loaded.search(search, report),
-        None => search.search_with_progress(&scan.radii_m, &scan.profiles, report),
+        Some(loaded) => loaded.estimate(report),
+        None => (scan.search).search_with_progress(&scan.radii_m, &scan.profiles, report),
     })
 }
 
@@ -532,13 +524,13 @@ fn page(estimate: &InclusionEstimate, scan: &Scan, hidden: Option<&Hidden>) -> P
 
 /// The block in section, to scale, with the lumps.
 fn section(scan: &Scan, estimate: &InclusionEstimate) -> Panel {
-    let specimen = scan.specimen;
+    let specimen = scan.search.specimen();
     let (height, radius) = (1e3 * specimen.height_m(), 1e3 * specimen.radius_m());
     let top = [[-radius, 0.0], [radius, 0.0]];
     let outline = top
         .into_iter()
         .chain([[radius, -height], [-radius, -height], top[0]]);
-    let face = 1e3 * scan.guide.radius_m();
+    let face = 1e3 * scan.search.guide().radius_m();
     let mut panel = Panel::new("Section, to scale", "x (mm)", "height (mm)")
         .equal_aspect()
         .line(outline, Colour::Grey, "block");
@@ -558,7 +550,7 @@ fn section(scan: &Scan, estimate: &InclusionEstimate) -> Panel {
 
 /// The faces of all presses and the lumps from above, to scale.
 fn above(scan: &Scan, estimate: &InclusionEstimate) -> Panel {
-    let face = 1e3 * scan.guide.radius_m();
+    let face = 1e3 * scan.search.guide().radius_m();
     let mut panel = Panel::new("From above, to scale", "x (mm)", "y (mm)").equal_aspect();
     for (k, axis) in scan.axes_mm().into_iter().enumerate() {
         let name = if k == 0 { "guide's face" } else { "" };

@@ -1,14 +1,19 @@
 //! Errors of the search in the whole face, on a folder of blocks solved in three dimensions.
 //!
 //! ```text
-//! cargo run --release -p tactile-inclusion --example picture_study -- FOLDER [SEEDS] [NAMES]
+//! cargo run --release -p tactile-inclusion --example picture_study -- FOLDER [DRAWS] [NAMES] [scan] [hand]
 //! ```
 //!
 //! FOLDER contains `scenes.csv` and for every scene a file `NAME.csv` (load_index, x_m, y_m,
 //! pressure_pa), as created by `evidence/inclusion_pictures.py` with CalculiX. The grid of 0.5 mm
 //! covers half of the face, or a quarter if the lump has a twin. Every scene is rotated about the
-//! axis, sampled on cells of 1 mm, and searched with SEEDS draws of the errors of the sensor. NAMES
+//! axis, sampled on cells of 1 mm, and searched with DRAWS draws of the errors of the sensor. NAMES
 //! selects the scenes whose names begin with one of them, separated by commas.
+//!
+//! With `scan`, scenes of one lump at several distances from the axis, with names `LUMP_x…`, are the
+//! presses of scans. Each draw has one to four presses in random directions from the lump, on cells
+//! of 2 mm, placed with an error of 0.2 mm. With `hand` this error is 2 mm, and each approach of
+//! each press has an error of 0.2 mm.
 #![allow(clippy::print_stdout)]
 
 #[path = "inclusion_study/shared.rs"]
@@ -16,8 +21,8 @@ mod shared;
 
 use core::ops::ControlFlow;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
-use shared::{guide, normal, number, table, wave};
-use std::collections::HashMap;
+use shared::{Row, guide, normal, number, table, text, wave};
+use std::collections::{BTreeMap, HashMap};
 use std::error::Error;
 use std::path::Path;
 use tactile_fem::Interface;
@@ -26,229 +31,354 @@ use tactile_inclusion::{
     TissueBlock,
 };
 
-/// Pressures of each load on cells of 1 mm, with the given centres.
+type Outcome<T> = Result<T, Box<dyn Error>>;
+
+/// A solved scene: pressures of each load over the approach, on cells with the given centres.
 struct Picture {
+    row: Row,
+    /// Distance of the lump's centre from the axis, along x.
+    aside_m: f64,
+    approaches_m: Vec<f64>,
     positions_m: Vec<[f64; 2]>,
     pressures_pa: Vec<Vec<f64>>,
 }
 
-/// The pressure image of a scene's file, mirrored to the whole face.
-fn picture(path: &Path, loads: usize, is_quarter: bool) -> Result<Picture, Box<dyn Error>> {
-    let mut known: Vec<HashMap<[i64; 2], f64>> = vec![HashMap::new(); loads];
-    for row in table(path)? {
-        let load = number(&row, "load_index")? as usize - 1;
-        // Grid indices.
-        let [x, y] = [number(&row, "x_m")?, number(&row, "y_m")?];
-        let [x, y] = [x, y].map(|value| (value / 0.5e-3).round() as i64);
-        // Near the outer part of the mirror plane between two lumps, the pressure is that of nodes
-        // whose elements are cut there: it is wrong by up to a tenth within a millimetre.
-        if is_quarter && x <= 2 && y > 11 {
-            continue;
-        }
-        let pressure = number(&row, "pressure_pa")?;
-        for sign_x in if is_quarter { vec![-1, 1] } else { vec![1] } {
-            for sign_y in [-1, 1] {
-                known[load].insert([sign_x * x, sign_y * y], pressure);
+impl Picture {
+    /// The pressure image of a scene's file, mirrored to the whole face, on cells `width` mm wide.
+    fn new(folder: &Path, row: &Row, width: i64) -> Outcome<Self> {
+        let is_quarter = number(row, "twin_at_minus_x")? > 0.0;
+        let approaches_m: Outcome<Vec<f64>> = (1..=3)
+            .map(|load| number(row, &format!("approach_{load}_m")))
+            .collect();
+        let approaches_m = approaches_m?;
+        let mut known: Vec<HashMap<[i64; 2], f64>> = vec![HashMap::new(); approaches_m.len()];
+        for point in table(&folder.join(format!("{}.csv", text(row, "scene")?)))? {
+            let load = number(&point, "load_index")? as usize - 1;
+            // Grid indices.
+            let [x, y] = [number(&point, "x_m")?, number(&point, "y_m")?];
+            let [x, y] = [x, y].map(|value| (value / 0.5e-3).round() as i64);
+            // Near the outer part of the mirror plane between two lumps, the pressure is that of
+            // nodes whose elements are cut there: it is wrong by up to a tenth within a millimetre.
+            if is_quarter && x <= 2 && y > 11 {
+                continue;
+            }
+            let pressure = number(&point, "pressure_pa")?;
+            for sign_x in if is_quarter { vec![-1, 1] } else { vec![1] } {
+                for sign_y in [-1, 1] {
+                    known[load].insert([sign_x * x, sign_y * y], pressure);
+                }
             }
         }
-    }
-    let mut positions_m = Vec::new();
-    let mut pressures_pa = vec![Vec::new(); loads];
-    for i in -14..14i64 {
-        for k in -14..14i64 {
-            // Four points of the grid around the centre of a cell.
-            let corners = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[a, b]| [2 * i + a, 2 * k + b]);
-            let mean = |known: &HashMap<[i64; 2], f64>| -> Option<f64> {
-                let values: Option<Vec<f64>> =
-                    corners.iter().map(|at| known.get(at).copied()).collect();
-                Some(values?.iter().sum::<f64>() / 4.0)
-            };
-            let means: Option<Vec<f64>> = known.iter().map(mean).collect();
-            if let Some(means) = means {
-                let middle = |index: i64| 1e-3 * index as f64 + 0.25e-3;
-                positions_m.push([middle(i), middle(k)]);
-                pressures_pa
-                    .iter_mut()
-                    .zip(means)
-                    .for_each(|(all, p)| all.push(p));
+        let mut picture = Self {
+            row: row.clone(),
+            aside_m: number(row, "x_m")?,
+            pressures_pa: vec![Vec::new(); approaches_m.len()],
+            approaches_m,
+            positions_m: Vec::new(),
+        };
+        let side = 2 * width;
+        let points = || (0..side).flat_map(|a| (0..side).map(move |b| [a, b]));
+        for i in -14 / width..14 / width {
+            for k in -14 / width..14 / width {
+                let mean = |known: &HashMap<[i64; 2], f64>| -> Option<f64> {
+                    let at = |[a, b]: [i64; 2]| known.get(&[side * i + a, side * k + b]).copied();
+                    let values: Option<Vec<f64>> = points().map(at).collect();
+                    Some(values?.iter().sum::<f64>() / (side * side) as f64)
+                };
+                let means: Option<Vec<f64>> = known.iter().map(mean).collect();
+                if let Some(means) = means {
+                    let middle =
+                        |index: i64| 0.5e-3 * ((side * index) as f64 + 0.5 * (side - 1) as f64);
+                    picture.positions_m.push([middle(i), middle(k)]);
+                    let pairs = picture.pressures_pa.iter_mut().zip(means);
+                    pairs.for_each(|(all, p)| all.push(p));
+                }
             }
         }
+        Ok(picture)
     }
-    Ok(Picture {
-        positions_m,
-        pressures_pa,
-    })
+
+    /// Pressures at another approach: pressure over approach is a parabola through three loads.
+    fn at(&self, approach_m: f64) -> Vec<f64> {
+        let weight = |k: usize| {
+            let others = (0..3)
+                .filter(|other| *other != k)
+                .map(|other| self.approaches_m[other]);
+            let here = self.approaches_m[k];
+            let factors = others.map(|other| (approach_m - other) / (here - other));
+            factors.product::<f64>() * approach_m / here
+        };
+        let weights = [0, 1, 2].map(weight);
+        let value = |cell: usize| {
+            (0..3)
+                .map(|k| weights[k] * self.pressures_pa[k][cell])
+                .sum()
+        };
+        (0..self.positions_m.len()).map(value).collect()
+    }
 }
 
 /// A smooth random field of unit variance.
-fn smooth_field(positions_m: &[[f64; 2]], length_m: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
-    let waves = 400;
-    let mut field = vec![0.0; positions_m.len()];
-    for _ in 0..waves {
-        let (wave, phase) = wave(length_m, rng);
-        for (value, [x, y]) in field.iter_mut().zip(positions_m) {
-            *value += (2.0 / f64::from(waves)).sqrt() * (wave[0] * x + wave[1] * y + phase).cos();
-        }
+struct Field(Vec<([f64; 2], f64)>);
+
+impl Field {
+    fn drawn(rng: &mut ChaCha8Rng) -> Self {
+        let length_m = SensorErrors::default().correlation_m;
+        Self((0..400).map(|_| wave(length_m, rng)).collect())
     }
-    field
+
+    fn at(&self, [x, y]: [f64; 2]) -> f64 {
+        let waves = self
+            .0
+            .iter()
+            .map(|(wave, phase)| (wave[0] * x + wave[1] * y + phase).cos());
+        (2.0 / self.0.len() as f64).sqrt() * waves.sum::<f64>()
+    }
 }
 
-/// Frames with the errors of the sensor: white noise of 0.75 % of the largest pressure on pixels of
-/// 86 µm, and the smooth errors of a calibration.
-fn measured(
+/// Standard errors of a person or a stage, in metres.
+struct Hand {
+    place_m: f64,
+    each_approach_m: f64,
+}
+
+/// A press with the errors of the sensor: white noise of 0.75 % of the largest pressure on pixels of
+/// 86 µm, and the smooth errors of a calibration. The lump lies at an angle from the axis.
+fn press(
     picture: &Picture,
-    approaches_m: &[f64],
-    zero_m: f64,
+    angle: f64,
+    stated_m: &[f64],
+    common: &Field,
+    hand: &Hand,
     rng: &mut ChaCha8Rng,
-) -> Vec<PressureProfile> {
+) -> ScanPress {
+    let (sine, cosine) = angle.sin_cos();
+    let turned = |[x, y]: [f64; 2]| [x * cosine - y * sine, x * sine + y * cosine];
+    let positions_m: Vec<[f64; 2]> = picture.positions_m.iter().map(|at| turned(*at)).collect();
     let sensor = SensorErrors::default();
-    let common = smooth_field(&picture.positions_m, sensor.correlation_m, rng);
-    let inner = |[x, y]: &[f64; 2]| x.hypot(*y) < 12e-3;
-    let largest = picture.pressures_pa.iter().flat_map(|frame| {
-        let pairs = frame.iter().zip(&picture.positions_m);
-        pairs.filter(|(_, at)| inner(at)).map(|(p, _)| *p)
-    });
-    let white = 7.5e-3 * largest.fold(0.0, f64::max) * 86e-6 / 1e-3;
-    let frames = picture.pressures_pa.iter().zip(approaches_m);
-    let frames = frames.map(|(pressures, approach)| {
-        let own = smooth_field(&picture.positions_m, sensor.correlation_m, rng);
-        let each = pressures.iter().zip(common.iter().zip(&own));
-        let read = each.map(|(pressure, (common, own))| {
-            let smooth = sensor.common * common + sensor.each_frame * own;
+    let inner = picture.positions_m.iter().map(|[x, y]| x.hypot(*y) < 12e-3);
+    let last = picture.pressures_pa.last().into_iter().flatten();
+    let largest = last
+        .zip(inner)
+        .filter(|(_, is_inner)| *is_inner)
+        .map(|(p, _)| *p);
+    let cell_m = (picture.positions_m[1][1] - picture.positions_m[0][1]).abs();
+    let white = 7.5e-3 * largest.fold(0.0, f64::max) * 86e-6 / cell_m;
+    let frames = stated_m.iter().map(|stated| {
+        let own = Field::drawn(rng);
+        let true_m = stated + hand.each_approach_m * normal(rng);
+        let each = picture.at(true_m).into_iter().zip(&positions_m);
+        let read = each.map(|(pressure, at)| {
+            let smooth = sensor.common * common.at(*at) + sensor.each_frame * own.at(*at);
             pressure * (1.0 + smooth) + white * normal(rng)
         });
+        let pressure_pa: Vec<f64> = read.collect();
         PressureProfile {
-            approach_m: approach - zero_m,
+            approach_m: *stated,
             force_n: None,
-            pressure_pa: read.collect(),
-            standard_error_pa: vec![white; pressures.len()],
+            standard_error_pa: vec![white; pressure_pa.len()],
+            pressure_pa,
         }
     });
-    frames.collect()
+    let frames = frames.collect();
+    let axis_m =
+        [cosine, sine].map(|direction| -picture.aside_m * direction + hand.place_m * normal(rng));
+    ScanPress {
+        axis_m,
+        positions_m,
+        frames,
+    }
 }
 
-/// Prints the results for a lump and the true values.
-fn print_lump(inclusion: &Inclusion, centre_m: [f64; 2], truth: [f64; 3]) {
-    if let Some(position) = &inclusion.position_m {
-        let off = [0, 1].map(|k| position[k].value - centre_m[k]);
-        let error = position[0].standard_error.hypot(position[1].standard_error);
-        let aside = centre_m[0].hypot(centre_m[1]);
-        let outwards = (off[0] * centre_m[0] + off[1] * centre_m[1]) / aside.max(1e-9);
-        let [away, outwards, error] = [off[0].hypot(off[1]), outwards, error].map(|x| 1e3 * x);
-        print!("; {away:.3} mm away, {outwards:.3} outwards (error {error:.3})");
-    }
-    let told = [
-        inclusion.diameter_m,
-        inclusion.depth_m,
-        inclusion.youngs_modulus_pa,
-    ];
-    for ((name, told), truth) in ["D", "d", "E1"].iter().zip(told).zip(truth) {
-        let estimated = told.estimate();
-        let [low, high] = estimated.interval;
-        let is_wrong = !(low..=high).contains(&truth);
+/// How often the 95 % intervals of each quantity hold.
+#[derive(Default)]
+struct Tally {
+    held: BTreeMap<&'static str, [usize; 2]>,
+    confidently_wrong: usize,
+}
+
+impl Tally {
+    /// Prints and counts a quantity with its true value.
+    fn add(&mut self, name: &'static str, value: f64, [low, high]: [f64; 2], truth: f64) -> bool {
+        // The interval of a ball's shape may be a single point.
+        let holds = (low * (1.0 - 1e-9)..=high * (1.0 + 1e-9)).contains(&truth)
+            || (low..=high).contains(&truth);
         print!(
-            "; {name} {}{:.3e} [{low:.3e} {high:.3e}]{}",
-            if matches!(told, Identifiable::No(_)) {
-                "open "
-            } else {
-                ""
-            },
-            estimated.value,
-            if is_wrong { " WRONG" } else { "" }
+            "; {name} {value:.3e} [{low:.3e} {high:.3e}]{}",
+            if holds { "" } else { " WRONG" }
         );
+        let [held, all] = self.held.entry(name).or_default();
+        *held += usize::from(holds);
+        *all += 1;
+        holds
+    }
+
+    /// Prints and counts the results for a lump: its true centre and D, d, E₁ and height over width.
+    fn add_lump(&mut self, inclusion: &Inclusion, centre_m: [f64; 2], truth: [f64; 4]) {
+        if let Some([x, y]) = &inclusion.position_m {
+            self.add("x", x.value, x.interval, centre_m[0]);
+            self.add("y", y.value, y.interval, centre_m[1]);
+            let away = (x.value - centre_m[0]).hypot(y.value - centre_m[1]);
+            print!("; {:.3} mm away", 1e3 * away);
+        }
+        let told = [
+            inclusion.diameter_m,
+            inclusion.depth_m,
+            inclusion.youngs_modulus_pa,
+        ];
+        for ((name, told), truth) in ["D", "d", "E1"].into_iter().zip(told).zip(truth) {
+            let estimated = told.estimate();
+            let holds = self.add(name, estimated.value, estimated.interval, truth);
+            if matches!(told, Identifiable::No(_)) {
+                print!(" open");
+            } else {
+                self.confidently_wrong += usize::from(!holds);
+            }
+        }
+        if let Some(shape) = &inclusion.height_over_width {
+            self.add("κ", shape.value, shape.interval, truth[3]);
+            print!(", ball {:.2}", inclusion.ball_probability);
+        }
+    }
+
+    fn print(&self) {
+        for (name, [held, all]) in &self.held {
+            print!("{name}: {held} of {all} hold; ");
+        }
+        println!("told and wrong {}", self.confidently_wrong);
     }
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let mut arguments = std::env::args().skip(1);
-    let folder = arguments.next().ok_or("usage: FOLDER [SEEDS] [NAMES]")?;
-    let seeds: u64 = arguments.next().map_or(Ok(1), |text| text.parse())?;
-    let names = arguments.next().unwrap_or_default();
-    let folder = Path::new(&folder);
-    for (index, row) in table(&folder.join("scenes.csv"))?.iter().enumerate() {
-        let name = row.get("scene").ok_or("no column scene")?;
-        if !names.split(',').any(|begin| name.starts_with(begin)) {
-            continue;
-        }
-        let numbers = |what: &str| -> Result<Vec<f64>, Box<dyn Error>> {
-            (1..=3)
-                .map(|load| number(row, &what.replace('#', &load.to_string())))
-                .collect()
+/// Searches presses of one lump in directions from it, and prints the results.
+fn search(
+    pictures: &[(&Picture, f64)],
+    stated_m: &[f64],
+    hand: &Hand,
+    rng: &mut ChaCha8Rng,
+    tally: &mut Tally,
+) -> Outcome<()> {
+    let (first, turn) = pictures[0];
+    let row = &first.row;
+    let height = number(row, "block_height_m")? * (0.02 * normal(rng)).exp();
+    let zero_m = 20e-6 * normal(rng);
+    let common = Field::drawn(rng);
+    let presses = pictures.iter().map(|(picture, angle)| {
+        let mut press = press(picture, *angle, stated_m, &common, hand, rng);
+        press
+            .frames
+            .iter_mut()
+            .for_each(|frame| frame.approach_m -= zero_m);
+        press
+    });
+    let mut scan = Scan {
+        presses: presses.collect(),
+        position_error_m: hand.place_m,
+    };
+    let is_single = scan.presses.len() == 1;
+    if is_single {
+        // The place of a single press is the origin.
+        scan.presses[0].axis_m = [0.0; 2];
+        scan.position_error_m = 0.0;
+    }
+    let specimen = TissueBlock::new(height, number(row, "block_radius_m")?)?
+        .with_each_approach_error_m(hand.each_approach_m)?;
+    let specimen = specimen.with_interface(match text(row, "contact")? {
+        "bonded" => Interface::Bonded,
+        _ => Interface::Frictionless,
+    });
+    let search = InclusionSearch::new(specimen, guide(number(row, "disc_radius_m")?)?)?;
+    let begun = std::time::Instant::now();
+    let estimate = search.search_scan(&scan, &mut |_| ControlFlow::Continue(()))?;
+    print!(
+        "{:.0} s, {:?}, p {:.3}, misfit {:.2}",
+        begun.elapsed().as_secs_f64(),
+        estimate.verdict(),
+        estimate.probability,
+        estimate.misfit
+    );
+    let axes = ["axis_x_m", "axis_y_m", "axis_z_m"].map(|name| number(row, name));
+    let [x, y, z] = axes;
+    let (x, y, z) = (x?, y?, z?);
+    let width = (x * y).sqrt();
+    let diameter = (x * y * z).cbrt();
+    let truth = [
+        diameter,
+        number(row, "depth_m")?,
+        number(row, "E1_pa")?,
+        z / width,
+    ];
+    let is_pair = number(row, "twin_at_minus_x")? > 0.0;
+    for inclusion in &estimate.inclusions() {
+        let place = |aside: f64| [aside * turn.cos(), aside * turn.sin()];
+        let mut centre_m = if is_single {
+            place(first.aside_m)
+        } else {
+            [0.0; 2]
         };
-        let approaches_m = numbers("approach_#_m")?;
-        let is_pair = number(row, "twin_at_minus_x")? > 0.0;
-        let picture = picture(
-            &folder.join(format!("{name}.csv")),
-            approaches_m.len(),
-            is_pair,
-        )?;
-        let axes = [
-            number(row, "axis_x_m")?,
-            number(row, "axis_y_m")?,
-            number(row, "axis_z_m")?,
-        ];
-        let diameter = (axes[0] * axes[1] * axes[2]).cbrt();
-        let truth = [diameter, number(row, "depth_m")?, number(row, "E1_pa")?];
-        for seed in 0..seeds {
-            let mut rng = ChaCha8Rng::seed_from_u64(1000 * seed + index as u64);
-            // The lump is at a random angle around the axis.
-            let turn = core::f64::consts::TAU * rng.random::<f64>();
-            let turned = |[x, y]: [f64; 2]| {
-                [
-                    x * turn.cos() - y * turn.sin(),
-                    x * turn.sin() + y * turn.cos(),
-                ]
-            };
-            let positions: Vec<[f64; 2]> =
-                picture.positions_m.iter().map(|&at| turned(at)).collect();
-            let height = number(row, "block_height_m")? * (0.02 * normal(&mut rng)).exp();
-            let zero_m = 20e-6 * normal(&mut rng);
-            let frames = measured(&picture, &approaches_m, zero_m, &mut rng);
-            let specimen = TissueBlock::new(height, number(row, "block_radius_m")?)?;
-            let specimen = match row.get("contact").map(String::as_str) {
-                Some("bonded") => specimen.with_interface(Interface::Bonded),
-                _ => specimen.with_interface(Interface::Frictionless),
-            };
-            let search = InclusionSearch::new(specimen, guide(number(row, "disc_radius_m")?)?)?;
-            let begun = std::time::Instant::now();
-            let progress = &mut |_| ControlFlow::Continue(());
-            let press = ScanPress {
-                axis_m: [0.0; 2],
-                positions_m: positions,
-                frames,
-            };
-            let scan = Scan {
-                presses: vec![press],
-                position_error_m: 0.0,
-            };
-            let estimate = search.search_scan(&scan, progress)?;
-            print!(
-                "{name} {seed}: {:.0} s, {:?}, p {:.3}, misfit {:.2}",
-                begun.elapsed().as_secs_f64(),
-                estimate.verdict(),
-                estimate.probability,
-                estimate.misfit
-            );
-            for inclusion in &estimate.inclusions() {
-                let x = number(row, "x_m")?;
-                // The nearer lump of a pair.
-                let places = [
-                    turned([x, 0.0]),
-                    turned([if is_pair { -x } else { x }, 0.0]),
-                ];
-                let away = |place: &[f64; 2]| {
-                    let told = inclusion
-                        .position_m
-                        .map_or([0.0; 2], |at| at.map(|x| x.value));
-                    (told[0] - place[0]).hypot(told[1] - place[1])
-                };
-                let nearest = places
-                    .into_iter()
-                    .min_by(|a, b| away(a).total_cmp(&away(b)));
-                print_lump(inclusion, nearest.unwrap_or_default(), truth);
+        if let Some([x, y]) = inclusion.position_m.filter(|_| is_pair) {
+            // The nearer lump of a pair.
+            if x.value * centre_m[0] + y.value * centre_m[1] < 0.0 {
+                centre_m = place(-first.aside_m);
             }
-            println!("; {:?}", estimate.warnings);
+        }
+        tally.add_lump(inclusion, centre_m, truth);
+    }
+    println!("; {:?}", estimate.warnings);
+    Ok(())
+}
+
+fn main() -> Outcome<()> {
+    let (words, mut arguments): (Vec<String>, Vec<String>) = std::env::args()
+        .skip(1)
+        .partition(|word| word == "scan" || word == "hand");
+    arguments.resize(3, String::new());
+    let is_scan = words.contains(&"scan".to_owned());
+    let hand = if words.contains(&"hand".to_owned()) {
+        Hand {
+            place_m: 2e-3,
+            each_approach_m: 0.2e-3,
+        }
+    } else {
+        Hand {
+            place_m: if is_scan { 0.2e-3 } else { 0.0 },
+            each_approach_m: 0.0,
+        }
+    };
+    let [folder, draws, names] = [0, 1, 2].map(|k| arguments[k].as_str());
+    let draws: u64 = if draws.is_empty() { 1 } else { draws.parse()? };
+    let folder = Path::new(folder);
+    let mut lumps: BTreeMap<String, Vec<Picture>> = BTreeMap::new();
+    for row in table(&folder.join("scenes.csv"))? {
+        let name = text(&row, "scene")?;
+        if names.split(',').any(|begin| name.starts_with(begin)) {
+            let lump = if is_scan {
+                name.split("_x").next()
+            } else {
+                None
+            };
+            let pictures = lumps.entry(lump.unwrap_or(name).to_owned()).or_default();
+            pictures.push(Picture::new(folder, &row, if is_scan { 2 } else { 1 })?);
         }
     }
+    let mut tally = Tally::default();
+    for (index, (name, pictures)) in lumps.iter().enumerate() {
+        for draw in 0..draws {
+            let mut rng = ChaCha8Rng::seed_from_u64(1000 * draw + index as u64);
+            let count = if is_scan { rng.random_range(1..=4) } else { 1 };
+            let mut chosen = Vec::new();
+            print!("{name} {draw}: presses");
+            for _ in 0..count {
+                let picture = &pictures[rng.random_range(0..pictures.len())];
+                print!(" {:.0}", 1e3 * picture.aside_m);
+                chosen.push((picture, core::f64::consts::TAU * rng.random::<f64>()));
+            }
+            print!(" mm aside, ");
+            // Scans have two approaches.
+            let all_m = &pictures[0].approaches_m;
+            let stated_m = if is_scan { &all_m[1..] } else { all_m };
+            search(&chosen, stated_m, &hand, &mut rng, &mut tally)?;
+        }
+    }
+    tally.print();
     Ok(())
 }

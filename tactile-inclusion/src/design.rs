@@ -2,8 +2,7 @@
 
 use crate::covariance::{Observed, Resolution};
 use crate::fit::Problem;
-use crate::hypothesis::BLOCK_COORDINATES;
-use crate::parameters::LumpParameters;
+use crate::parameters::{BLOCK, LumpParameters};
 use crate::search::InclusionSearch;
 use crate::tissue_block::check_approaches;
 use tactile_elasticity::{ElasticityError, Quantity};
@@ -115,6 +114,7 @@ impl InclusionSearch {
         let covariance = observed.covariance(self.sensor(), interface, Resolution::Answer);
         let mut priors = self.block_priors(assumed.block_modulus_pa);
         priors.extend(self.lump_priors(assumed.block_modulus_pa));
+        priors.extend(self.approach_priors(1, approaches_m));
         let problem = Problem {
             forward,
             measured: observed.values,
@@ -122,7 +122,7 @@ impl InclusionSearch {
             priors,
         };
         let errors = (problem.errors(&parameters)).ok_or(ElasticityError::NoSolution)?;
-        let [diameter, depth, youngs_modulus] = [0, 1, 2].map(|k| errors[BLOCK_COORDINATES + k]);
+        let [diameter, depth, youngs_modulus] = [0, 1, 2].map(|k| errors[BLOCK.len() + k]);
         Ok(ExpectedErrors {
             diameter,
             depth,

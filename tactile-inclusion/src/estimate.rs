@@ -199,6 +199,9 @@ pub enum InclusionWarning {
     /// values, and the intervals cover both. If one of them could not be solved, no parameter is
     /// identified.
     UncertainInterface,
+    /// The specimen states one contact condition, and the other explains the frames clearly better.
+    /// The better one gives the values, and the intervals cover both.
+    ContradictedInterface,
     /// The inclusion is closer to the surface or to the stage than half an element, where the model
     /// does not apply.
     AtBoundary,
@@ -241,6 +244,10 @@ impl fmt::Display for InclusionWarning {
             Self::UncertainInterface => {
                 f.write_str("bonded and frictionless faces explain the frames about equally well")
             }
+            Self::ContradictedInterface => f.write_str(
+                "the frames contradict the stated interface: with the other they are explained \
+                 better; intervals cover both",
+            ),
             Self::AtBoundary => {
                 f.write_str("the lump touches the surface or the base: the model does not apply")
             }

@@ -52,18 +52,14 @@ pub(crate) struct Problem {
 #[derive(Debug, Clone)]
 pub(crate) struct Fit {
     pub parameters: Parameters,
+    /// The quadratic model of the objective there.
+    pub normal: Normal,
     /// Covariance of the coordinates, in the order of the priors.
     pub covariance: DMatrix<f64>,
-    /// rᵀ C⁻¹ r.
-    pub misfit: f64,
-    /// Contribution of the priors to the objective.
-    pub penalty: f64,
     /// Log-evidence by Laplace's approximation, up to a constant common to all models.
     pub evidence: f64,
     /// Contribution of the posterior's volume relative to the prior's.
     pub volume: f64,
-    pub predicted: Vec<f64>,
-    pub solved: Solved,
     pub converged: bool,
 }
 
@@ -123,10 +119,13 @@ pub(crate) struct FitStep {
 }
 
 /// The quadratic model of the objective at some parameters.
+#[derive(Debug, Clone)]
 pub(crate) struct Normal {
     pub matrix: DMatrix<f64>,
     pub gradient: DVector<f64>,
+    /// rᵀ C⁻¹ r.
     pub misfit: f64,
+    /// Contribution of the priors to the objective.
     pub penalty: f64,
     /// Whitened derivatives of the values.
     pub columns: Vec<DVector<f64>>,
@@ -143,7 +142,7 @@ fn fix(matrix: &mut DMatrix<f64>, gradient: &mut DVector<f64>, k: usize, step: f
     gradient[k] = step;
 }
 
-impl Fit {
+impl Normal {
     /// −2 ln of the posterior density, up to a constant.
     pub(crate) fn objective(&self) -> f64 {
         self.misfit + self.penalty
@@ -268,7 +267,7 @@ impl Problem {
             // Distance from the optimum of the quadratic model. Steps shortened by damping are no
             // measure of it.
             let left = self.step(&parameters, &normal, 0.0, None)?.size;
-            let reachable = normal.misfit + normal.penalty - PREDICTED_GAIN * left.powi(2);
+            let reachable = normal.objective() - PREDICTED_GAIN * left.powi(2);
             if left < ending.step || reachable > ending.needed {
                 break true;
             }
@@ -284,13 +283,13 @@ impl Problem {
                 &parameters,
                 &self.step(&parameters, &normal, damping, None)?.by,
             );
-            let now = normal.misfit + normal.penalty;
+            let now = normal.objective();
             let found = (self.forward).predict_near(&next, Some(&normal.solved));
             // The derivatives of a rejected step are not needed.
             let found = found.filter(|(there, _)| self.objective(&next, there) <= now);
             match found.and_then(|(there, solved)| self.normal_at(&next, there, solved)) {
                 Some(found) => {
-                    let gain = now - found.misfit - found.penalty;
+                    let gain = now - found.objective();
                     let is_undamped = damping < 1e-2;
                     damping = (0.1 * damping).max(LEAST_DAMPING);
                     (parameters, normal) = (next, found);
@@ -350,7 +349,7 @@ impl Problem {
     }
 
     fn finished(&self, parameters: Parameters, normal: Normal, converged: bool) -> Option<Fit> {
-        let cholesky = normal.matrix.cholesky()?;
+        let cholesky = normal.matrix.clone().cholesky()?;
         let logarithm: f64 = cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
         let known: f64 = self
             .priors
@@ -361,12 +360,9 @@ impl Problem {
         Some(Fit {
             parameters,
             covariance: cholesky.inverse(),
-            misfit: normal.misfit,
-            penalty: normal.penalty,
-            evidence: -0.5 * (normal.misfit + normal.penalty) + volume - self.noise(),
+            evidence: -0.5 * normal.objective() + volume - self.noise(),
+            normal,
             volume,
-            predicted: normal.predicted,
-            solved: normal.solved,
             converged,
         })
     }

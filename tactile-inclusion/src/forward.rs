@@ -125,7 +125,7 @@ pub(crate) struct Forward {
 #[derive(Debug, Clone)]
 pub(crate) struct Solved {
     meshed: Arc<Meshed>,
-    frames: SolvedFrames,
+    pub frames: SolvedFrames,
     /// The scene with the second inclusion in place of the first. `None` for a single inclusion.
     second: Option<Box<Solved>>,
 }
@@ -298,11 +298,6 @@ impl Forward {
         Some(self)
     }
 
-    /// Relative increase of the pressure above an inclusion.
-    pub(crate) fn lift(&self, solved: &Solved) -> f64 {
-        (self.cells.as_ref()).map_or(0.0, |cells| cells.lift(&solved.frames))
-    }
-
     /// The scene for parameters near those of `scene`, on its mesh.
     fn changed(&self, scene: &FemScene, from: &Parameters, to: &Parameters) -> Option<FemScene> {
         let tissue = self.guide.layers().len();
@@ -330,17 +325,23 @@ impl Forward {
     ) -> Vec<f64> {
         let frames = 0..self.approaches_m.len();
         let mut values = Vec::with_capacity(self.observations());
+        let pressed = |press: usize, frame: usize| {
+            let frame = press * self.approaches_m.len() + frame;
+            parameters.get(Coordinate::Pressed(frame)).exp()
+        };
         for frame in frames.clone() {
             let axial = |radius: f64| pressure(frame, radius);
             let of_second = |radius: f64| pressure_of_second(frame, radius);
             match &self.cells {
                 Some(cells) => {
-                    values.extend(cells.pressures(frame, parameters, &axial, &of_second));
+                    let pressures = cells.pressures(frame, parameters, &axial, &of_second);
+                    let pairs = pressures.iter().zip(&cells.positions.presses);
+                    values.extend(pairs.map(|(p, press)| p * pressed(*press, frame)));
                 }
-                None => values.extend(self.radii_m.iter().map(|&r| axial(r))),
+                None => values.extend(self.radii_m.iter().map(|&r| axial(r) * pressed(0, frame))),
             }
         }
-        values.extend(frames.map(force));
+        values.extend(frames.map(|frame| force(frame) * pressed(0, frame)));
         values
     }
 

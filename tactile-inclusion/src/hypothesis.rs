@@ -18,8 +18,8 @@ use crate::covariance::Observed;
 use crate::estimate::{
     Estimated, Identifiable, Inclusion, InclusionEstimate, InclusionWarning, TWO_SIDED_95,
 };
-use crate::fit::{Fit, Problem};
-use crate::parameters::{Coordinate, Parameters};
+use crate::fit::{Fit, Normal, Problem};
+use crate::parameters::Coordinate;
 use crate::ridge::Marginal;
 use crate::starts::GridStart;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
@@ -71,9 +71,6 @@ pub(crate) fn better<'a>(homogeneous: &'a Fit, lump: Option<&'a Fit>) -> &'a Fit
         .unwrap_or(homogeneous)
 }
 
-/// Number of coordinates of the block. They come first; ln D, ln d and ln E₁ follow.
-pub(crate) const BLOCK_COORDINATES: usize = 4;
-
 /// The best fits under one assumption about the face.
 pub(crate) struct Hypothesis {
     pub problem: Problem,
@@ -114,7 +111,7 @@ impl Hypothesis {
     /// χ² over its degrees of freedom, but at least one: the factor by which differences of
     /// log-evidence are too large.
     pub(crate) fn inflation(&self, observed: &Observed) -> f64 {
-        (self.better().misfit / observed.values.len() as f64).max(1.0)
+        (self.better().normal.misfit / observed.values.len() as f64).max(1.0)
     }
 
     /// Log-evidence with an inclusion. Without a fit, it comes from the grid.
@@ -143,9 +140,9 @@ impl Hypothesis {
             let modulus = |coordinate| fit.parameters.get(coordinate);
             let contrast = modulus(Coordinate::LumpModulus) - modulus(Coordinate::BlockModulus);
             probability(log_odds) > LEAST_PROBABILITY
-                && self.homogeneous.misfit - fit.misfit > LEAST_FALL
+                && self.homogeneous.normal.misfit - fit.normal.misfit > LEAST_FALL
                 && contrast.abs() > f64::ln(LEAST_CONTRAST)
-                && fit.misfit < LARGEST_MISFIT * values
+                && fit.normal.misfit < LARGEST_MISFIT * values
                 && lowest < parameters.height_m
         })
     }
@@ -159,7 +156,7 @@ impl Hypothesis {
         let is_modulus = coordinate == Coordinate::LumpModulus;
         let mut best = fit.parameters.get(coordinate);
         let coordinate = self.index(coordinate).unwrap_or(0);
-        let is_lump = fit.covariance.nrows() > BLOCK_COORDINATES;
+        let is_lump = fit.parameters.lump.is_some();
         let (at, [low, high]) = match self.marginal.as_ref().filter(|_| is_lump) {
             Some(marginal) => {
                 let median = marginal.median(coordinate);
@@ -192,19 +189,6 @@ impl Hypothesis {
         inverse.is_some_and(|inverse| elongation.dot(&(inverse * elongation)) > LARGEST)
     }
 
-    /// Whether a sixth of an inclusion lies outside the used part of the face in every press. Two
-    /// presses whose used parts cover its centre show it from two sides.
-    fn is_at_rim(&self, parameters: &Parameters) -> bool {
-        let (Some(lump), Some(cells)) = (parameters.lump, &self.problem.forward.cells) else {
-            return false;
-        };
-        let [x, y] = parameters.place.centre_m;
-        let axes_m = cells.positions.axes_m.iter();
-        let asides: Vec<f64> = axes_m.map(|[a, b]| (x - a).hypot(y - b)).collect();
-        let is_cut = |aside: &f64| aside + lump.diameter_m / 3.0 > cells.reach_m;
-        asides.iter().all(is_cut) && asides.iter().filter(|a| **a < cells.reach_m).count() < 2
-    }
-
     /// Index of a coordinate among those fitted.
     fn index(&self, coordinate: Coordinate) -> Option<usize> {
         let mut priors = self.problem.priors.iter();
@@ -224,13 +208,13 @@ impl Hypothesis {
     fn correlation(&self, fit: &Fit) -> [[f64; 3]; 3] {
         let marginal = self.marginal.as_ref().map(Marginal::covariance);
         let c = marginal.as_ref().unwrap_or(&fit.covariance);
-        let at = |k: usize| BLOCK_COORDINATES + k;
-        core::array::from_fn(|i| {
-            core::array::from_fn(|k| {
-                let variances = c[(at(i), at(i))] * c[(at(k), at(k))];
-                c[(at(i), at(k))] / variances.sqrt()
-            })
-        })
+        let sizes = [
+            Coordinate::Diameter,
+            Coordinate::Depth,
+            Coordinate::LumpModulus,
+        ];
+        let at = sizes.map(|coordinate| self.index(coordinate).unwrap_or(0));
+        at.map(|i| at.map(|k| c[(i, k)] / (c[(i, i)] * c[(k, k)]).sqrt()))
     }
 
     /// The result. `rival` fits the frames about equally well; `is_unsolved` means that a possible
@@ -245,8 +229,8 @@ impl Hypothesis {
         let found = self.found(log_odds);
         let is_found = found.is_some();
         let chosen = found.unwrap_or(&self.homogeneous);
-        let misfit = chosen.misfit / observed.values.len() as f64;
-        let is_poor = is_poor(chosen.misfit, observed);
+        let misfit = chosen.normal.misfit / observed.values.len() as f64;
+        let is_poor = is_poor(chosen.normal.misfit, observed);
         let widened = if is_poor { misfit.sqrt() } else { 1.0 };
         let mut warnings = Vec::new();
         if is_poor {
@@ -265,7 +249,8 @@ impl Hypothesis {
         if is_at_boundary {
             warnings.push(InclusionWarning::AtBoundary);
         }
-        let is_at_rim = self.is_at_rim(&chosen.parameters);
+        let cells = self.problem.forward.cells.as_ref();
+        let is_at_rim = cells.is_some_and(|cells| cells.is_at_rim(&chosen.parameters));
         if is_at_rim {
             warnings.push(InclusionWarning::AtRim);
         }
@@ -330,8 +315,8 @@ impl Hypothesis {
             misfit,
             warnings,
             radii_m: observed.radii_m.clone(),
-            fitted_pa: split(&chosen.predicted),
-            homogeneous_pa: split(&self.homogeneous.predicted),
+            fitted_pa: split(&chosen.normal.predicted),
+            homogeneous_pa: split(&self.homogeneous.normal.predicted),
         }
     }
 }
@@ -350,34 +335,46 @@ fn hull(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
 
-/// A homogeneous fit with its derivatives, to assess changes of its pressures.
-pub(crate) struct PlainFit {
-    predicted: Vec<f64>,
-    /// Whitened derivatives with respect to the block's parameters.
+/// A fit with its derivatives, to assess changes of its values.
+pub(crate) struct Assessed<'a> {
+    problem: &'a Problem,
+    normal: &'a Normal,
+    /// Whitened derivatives with respect to the fitted parameters.
     columns: DMatrix<f64>,
-    gradient: DVector<f64>,
     precision: Cholesky<f64, Dyn>,
 }
 
-impl PlainFit {
-    /// `None` if the fit has no derivatives.
-    pub(crate) fn new(problem: &Problem, fit: &Fit) -> Option<Self> {
-        let normal = problem.normal(&fit.parameters, Some(&fit.solved))?;
+impl<'a> Assessed<'a> {
+    /// `None` if the curvature at the fit is not positive.
+    pub(crate) fn new(problem: &'a Problem, normal: &'a Normal) -> Option<Self> {
         Some(Self {
+            problem,
+            normal,
             columns: DMatrix::from_columns(&normal.columns),
-            precision: normal.matrix.cholesky()?,
-            gradient: normal.gradient,
-            predicted: normal.predicted,
+            precision: normal.matrix.clone().cholesky()?,
         })
     }
 
     /// The whitened change of the values for relative changes.
-    pub(crate) fn added(&self, problem: &Problem, relative: &[f64]) -> DVector<f64> {
-        let added = relative
-            .iter()
-            .zip(&self.predicted)
-            .map(|(part, p)| part * p);
-        problem.whitened(DVector::from_iterator(self.predicted.len(), added))
+    pub(crate) fn added(&self, relative: impl Iterator<Item = f64>) -> DVector<f64> {
+        let values = relative.zip(&self.normal.predicted);
+        let added = values.map(|(part, p)| part * p);
+        let count = self.normal.predicted.len();
+        self.problem.whitened(DVector::from_iterator(count, added))
+    }
+
+    /// The whitened residual, without the part that the parameters can still absorb.
+    fn left(&self) -> DVector<f64> {
+        let residual = self.problem.residual(&self.normal.predicted);
+        let absorbed = self.precision.solve(&self.normal.gradient);
+        self.problem.whitened(residual) - &self.columns * absorbed
+    }
+
+    /// Log-odds of other values against those of the fit, whose parameters are fitted along.
+    pub(crate) fn log_odds(&self, values: &[f64]) -> f64 {
+        let pairs = values.iter().zip(&self.normal.predicted);
+        let added = self.added(pairs.map(|(other, value)| other / value - 1.0));
+        added.dot(&self.left()) - 0.5 * self.gain(&added)
     }
 
     /// Fall of χ² by a whitened change that is present, minus the part that the parameters of the
@@ -398,16 +395,14 @@ pub(crate) struct Score {
 }
 
 impl Score {
-    /// Computes the score of a fit without inclusion. `None` if the fit has no derivatives.
+    /// Computes the score of a fit without inclusion. `None` if the curvature at the fit is not positive.
     pub(crate) fn new(problem: &Problem, homogeneous: &Fit, grid: &[GridStart]) -> Option<Self> {
-        let plain = PlainFit::new(problem, homogeneous)?;
-        let residual = problem.whitened(problem.residual(&plain.predicted));
-        // The part that the parameters of the homogeneous block cannot absorb.
-        let left = &residual - &plain.columns * plain.precision.solve(&plain.gradient);
+        let plain = Assessed::new(problem, &homogeneous.normal)?;
+        let left = plain.left();
         let mut odds = Vec::new();
         let mut predicted_gain = 0.0f64;
         for start in grid {
-            let added = plain.added(problem, &start.added);
+            let added = plain.added(start.added.iter().copied());
             let square = plain.gain(&added);
             if square <= 0.0 {
                 continue;

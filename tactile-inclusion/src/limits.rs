@@ -1,7 +1,7 @@
 //! The smallest inclusion that can be found at each position.
 
 use crate::forward::{Forward, Solved};
-use crate::hypothesis::PlainFit;
+use crate::hypothesis::Assessed;
 use crate::parameters::{LumpParameters, Parameters};
 use crate::progress::Counter;
 use crate::scan::Scan;
@@ -86,9 +86,12 @@ impl InclusionSearch {
         let block = block.ok_or(ElasticityError::NoSolution)?;
         let problem = self.on_answers_mesh(&block.problem, &observed);
         let problem = problem.ok_or(ElasticityError::NoSolution)?;
-        let plain = PlainFit::new(&problem, &block.fit).ok_or(ElasticityError::NoSolution)?;
+        let fit = &block.fit;
+        let normal = problem.normal(&fit.parameters, Some(&fit.normal.solved));
+        let normal = normal.ok_or(ElasticityError::NoSolution)?;
+        let plain = Assessed::new(&problem, &normal).ok_or(ElasticityError::NoSolution)?;
         let axes_m = scan.presses.iter().map(|press| press.axis_m);
-        let reach_m = USED_FACE * self.guide.radius_m();
+        let reach_m = USED_FACE * self.guide().radius_m();
         let is_searched = |[x, y]: &[f64; 2]| {
             let mut axes_m = axes_m.clone();
             axes_m.any(|axis| (x - axis[0]).hypot(y - axis[1]) <= reach_m)
@@ -97,7 +100,7 @@ impl InclusionSearch {
         for &depth_m in depths_m {
             let mut balls = Vec::new();
             for diameter in DIAMETERS {
-                let diameter_m = diameter * self.guide.radius_m();
+                let diameter_m = diameter * self.guide().radius_m();
                 let modulus_pa = contrast * block.known.block_modulus_pa;
                 let lump = LumpParameters::ball(diameter_m, depth_m, modulus_pa);
                 if lump.diameter_m + depth_m < DEEPEST * self.specimen().height_m() {
@@ -113,7 +116,7 @@ impl InclusionSearch {
                 }
                 let gain = |ball: &Ball| {
                     let added = ball.added(&block.linear, *place);
-                    plain.gain(&plain.added(&problem, &added))
+                    plain.gain(&plain.added(added.into_iter()))
                 };
                 least_found(balls.iter().map(|ball| (ball.diameter_m(), gain(ball))))
             };
@@ -135,7 +138,7 @@ impl InclusionSearch {
         limits_m: &[Vec<f64>],
         candidates_m: &[[f64; 2]],
     ) -> Option<[f64; 2]> {
-        let face_m = self.guide.radius_m();
+        let face_m = self.guide().radius_m();
         let volume = |limit: &f64| (limit / face_m).min(1.0).powi(3);
         let hidden = |place: usize| {
             let limits = limits_m.iter().filter_map(|limits| limits.get(place));

@@ -11,7 +11,7 @@ use crate::covariance::{Observed, Resolution};
 use crate::estimate::InclusionEstimate;
 use crate::fit::{FIRST_FIT_ENDING, Fit, PAIR_ENDING, Prior, Problem};
 use crate::forward::Forward;
-use crate::hypothesis::{BLOCK_COORDINATES, Hypothesis, is_poor};
+use crate::hypothesis::{Hypothesis, is_poor};
 use crate::parameters::{Coordinate, LumpParameters, Parameters};
 use crate::picture::extent;
 use crate::progress::Counter;
@@ -79,7 +79,7 @@ impl Pair {
     /// Whether the fits converged and explain the pressure, and the inclusions do not overlap.
     fn is_possible(&self, observed: &Observed) -> bool {
         self.fits().all(|fit| {
-            fit.converged && !is_poor(fit.misfit, observed) && apart(&fit.parameters) > 1.0
+            fit.converged && !is_poor(fit.normal.misfit, observed) && apart(&fit.parameters) > 1.0
         })
     }
 }
@@ -118,11 +118,12 @@ impl InclusionSearch {
         counter: &mut Counter<'_>,
     ) -> Option<InclusionEstimate> {
         let one = ones.first()?.better();
-        if observed.cells.is_none() || !is_poor(one.misfit, observed) {
+        if observed.cells.is_none() || !is_poor(one.normal.misfit, observed) {
             return None;
         }
         // If the block may be plain, no inclusion was fitted.
-        let is_fitted = |one: &&Hypothesis| one.problem.priors.len() > BLOCK_COORDINATES;
+        let is_fitted =
+            |one: &&Hypothesis| !(one.problem.priors.iter()).all(|p| p.coordinate.is_of_block());
         let fitted: Vec<&Hypothesis> = ones.iter().filter(is_fitted).collect();
         let mut pairs: Vec<Pair> = (fitted.iter())
             .filter_map(|one| self.fit_pair(observed, approaches_m, one, counter))
@@ -192,9 +193,9 @@ impl InclusionSearch {
             let mut lifts: f64 = 1.0;
             for lump in [&at, &at.swapped()] {
                 let (_, solved) = forward.predict_near(lump, None)?;
-                let lift = forward.lift(&solved).min(1.0);
-                observed = observed.with_lump_aside(lump.place.centre_m, &forward, lift);
-                lifts *= lift;
+                observed = observed.with_lump_aside(lump, &forward, &solved)?;
+                let cells = forward.cells.as_ref();
+                lifts *= cells.map_or(0.0, |cells| cells.lift(&solved.frames).min(1.0));
             }
             let alone = NEIGHBOURS * lifts.sqrt() / apart(&at).max(1.0);
             observed = observed.with_neighbours(alone * side_by_side(&at));

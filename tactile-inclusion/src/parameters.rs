@@ -32,6 +32,9 @@ pub(crate) struct Parameters {
     /// Deviation of the axis of each press from its stated position, for the first presses. The
     /// others have none.
     pub strayed_m: Vec<[f64; 2]>,
+    /// Logarithms of the factors by which the approaches of single frames change their pressures,
+    /// press by press. Those left out are zero.
+    pub pressed: Vec<f64>,
     /// Zero error: the amount by which the measured approaches are too small.
     pub zero_m: f64,
     pub height_m: f64,
@@ -97,6 +100,8 @@ pub(crate) enum Coordinate {
     Spread,
     /// x and y of the deviation of a press from its stated position, in metres.
     Strayed(usize, usize),
+    /// Logarithm of the factor by which the approach of a press's frame changes its pressure.
+    Pressed(usize),
     /// A coordinate of the second inclusion.
     OfSecond(&'static Coordinate),
 }
@@ -119,6 +124,11 @@ impl Coordinate {
         OF_LUMP.iter().find(|c| **c == self).map(Self::OfSecond)
     }
 
+    /// Whether a block without an inclusion has this coordinate.
+    pub(crate) fn is_of_block(self) -> bool {
+        BLOCK.contains(&self) || matches!(self, Self::Pressed(_))
+    }
+
     /// Whether a block solved with its inclusion on the axis is independent of this coordinate.
     pub(crate) fn is_place(self) -> bool {
         matches!(
@@ -128,6 +138,7 @@ impl Coordinate {
                 | Self::Carried
                 | Self::Spread
                 | Self::Strayed(..)
+                | Self::Pressed(_)
         ) || matches!(self, Self::OfSecond(coordinate) if coordinate.is_place())
     }
 }
@@ -177,6 +188,7 @@ impl Parameters {
             Coordinate::Carried => self.place.carried,
             Coordinate::Spread => self.place.spread,
             Coordinate::OfSecond(coordinate) => self.swapped().get(*coordinate),
+            Coordinate::Pressed(frame) => self.pressed.get(frame).copied().unwrap_or(0.0),
             Coordinate::Strayed(press, axis) => self
                 .strayed_m
                 .get(press)
@@ -227,6 +239,11 @@ impl Parameters {
                 if let Some(strayed) = moved.strayed_m.get_mut(press) {
                     strayed[axis] += step;
                 }
+            }
+            (Coordinate::Pressed(frame), _) => {
+                let count = moved.pressed.len().max(frame + 1);
+                moved.pressed.resize(count, 0.0);
+                moved.pressed[frame] += step;
             }
             (Coordinate::OfSecond(_), _) => {}
         }

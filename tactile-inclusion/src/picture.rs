@@ -73,6 +73,21 @@ pub(crate) struct CellPositions {
     pub axes_m: Vec<[f64; 2]>,
 }
 
+impl CellPositions {
+    /// Position of the axis of a press.
+    pub(crate) fn axis_m(&self, press: usize, block: &Parameters) -> [f64; 2] {
+        let strayed = block.strayed_m.get(press).copied().unwrap_or_default();
+        [0, 1].map(|k| self.axes_m[press][k] + strayed[k])
+    }
+
+    /// Distances of the inclusion's centre from the axis of each press.
+    pub(crate) fn asides_m(&self, block: &Parameters) -> Vec<f64> {
+        let [x, y] = block.place.centre_m;
+        let axes_m = (0..self.axes_m.len()).map(|press| self.axis_m(press, block));
+        axes_m.map(|[a, b]| (x - a).hypot(y - b)).collect()
+    }
+}
+
 /// A block without a lump.
 #[derive(Debug, Clone)]
 pub(crate) struct PlainBlock {
@@ -148,9 +163,7 @@ impl Cells {
         let of_first = self.ratio(plain, frame, parameters, axial);
         let of_second = (second.as_ref()).map(|s| self.ratio(plain, frame, s, axial_of_second));
         let at = |(&position, &press): (&[f64; 2], &usize)| {
-            let strayed = parameters.strayed_m.get(press).copied();
-            let strayed = strayed.unwrap_or_default();
-            let axis = [0, 1].map(|k| self.positions.axes_m[press][k] + strayed[k]);
+            let axis = self.positions.axis_m(press, parameters);
             plain.pressure_at(frame, radius(position), parameters)
                 * of_first(position, axis)
                 * of_second
@@ -202,6 +215,17 @@ impl Cells {
         let beyond = (aside_m / self.reach_m - 1.0).clamp(0.0, 1.0);
         let far = (self.reach_m / distance_m.max(self.reach_m)).powi(3);
         1.0 - beyond * (1.0 - far)
+    }
+
+    /// Whether a sixth of an inclusion lies outside the used part of the face in every press. Two
+    /// presses whose used parts cover its centre show it from two sides.
+    pub(crate) fn is_at_rim(&self, parameters: &Parameters) -> bool {
+        let Some(lump) = parameters.lump else {
+            return false;
+        };
+        let asides = self.positions.asides_m(parameters);
+        let is_cut = |aside: &f64| aside + lump.diameter_m / 3.0 > self.reach_m;
+        asides.iter().all(is_cut) && asides.iter().filter(|a| **a < self.reach_m).count() < 2
     }
 
     /// Relative excess of the pressure above the lump over that of a plain block, in the last

@@ -92,13 +92,12 @@ impl Problem {
     /// curvature there.
     pub(crate) fn ridge(&self, fit: &Fit, mut go_on: impl FnMut() -> bool) -> Option<Ridge> {
         let index = (self.coordinates().iter()).position(|c| *c == Coordinate::LumpModulus)?;
-        let normal = self.normal(&fit.parameters, Some(&fit.solved))?;
-        let (node, start) = self.node(&fit.parameters, normal, index)?;
+        let (node, start) = self.node(&fit.parameters, fit.normal.clone(), index)?;
         let top = node.density;
         let mut nodes = vec![node];
         for sign in [-1.0, 1.0] {
             let mut place = Place {
-                solved: fit.solved.clone(),
+                solved: fit.normal.solved.clone(),
                 tangent: start.tangent.clone(),
                 parameters: start.parameters.clone(),
                 ..start

@@ -2,10 +2,10 @@
 //! about the face.
 
 use crate::covariance::{Observed, ObservedCells, Resolution};
-use crate::estimate::InclusionEstimate;
+use crate::estimate::{InclusionEstimate, InclusionWarning};
 use crate::fit::{ANSWER_ENDING, FIRST_FIT_ENDING, Fit, Prior, Problem};
 use crate::forward::Forward;
-use crate::hypothesis::{BLOCK_COORDINATES, Hypothesis, LEAST_GAIN, Score, better};
+use crate::hypothesis::{Assessed, Hypothesis, LEAST_GAIN, Score, better};
 use crate::parameters::{Coordinate, LARGEST_POISSON_RATIO, Parameters, Place};
 use crate::picture::{Cells, extent};
 use crate::progress::Counter;
@@ -114,7 +114,7 @@ const SPREAD: (f64, f64) = (0.13, 0.07);
 #[derive(Debug, Clone)]
 pub struct InclusionSearch {
     specimen: TissueBlock,
-    pub(crate) guide: Guide,
+    guide: Guide,
     sensor: SensorErrors,
     shape_error: f64,
 }
@@ -234,8 +234,78 @@ impl InclusionSearch {
         let interfaces = self.specimen.interfaces();
         // Per contact condition: a homogeneous fit, the grid, two first fits and the final fit.
         let mut counter = Counter::new(interfaces.len() * 55, progress);
-        let blocks: Vec<HomogeneousFit> = (interfaces.into_iter())
-            .filter_map(|face| self.homogeneous(observed, approaches_m, face, &mut counter))
+        let (mut hypotheses, mut is_unsolved) =
+            self.hypotheses(observed, approaches_m, &interfaces, &mut counter);
+        let pair = self.pair(observed, approaches_m, &hypotheses, &mut counter);
+        if let Some(pair) = pair.filter(|_| !counter.cancelled) {
+            return Ok(pair);
+        }
+        let contradicting = (hypotheses.first().filter(|_| interfaces.len() == 1))
+            .and_then(|stated| self.contradicting(observed, stated, &mut counter));
+        if let Some(other) = contradicting {
+            let (others, _) = self.hypotheses(observed, approaches_m, &[other], &mut counter);
+            is_unsolved |= others.is_empty();
+            hypotheses.extend(others);
+        }
+        let best = (hypotheses.iter()).map(Hypothesis::evidence);
+        let needed = best.fold(f64::NEG_INFINITY, f64::max) - RIVAL_EVIDENCE;
+        for hypothesis in &mut hypotheses {
+            if contradicting.is_some() || hypothesis.evidence() > needed {
+                hypothesis.follow(|| counter.step());
+            }
+        }
+        if counter.cancelled {
+            return Err(ElasticityError::Cancelled);
+        }
+        hypotheses.sort_by(|a, b| b.evidence().total_cmp(&a.evidence()));
+        let mut hypotheses = hypotheses.into_iter();
+        let best = hypotheses.next().ok_or(ElasticityError::NoSolution)?;
+        let clear = CLEAR_EVIDENCE * best.inflation(observed);
+        let rival = (hypotheses.next())
+            .filter(|other| contradicting.is_some() || best.evidence() - other.evidence() < clear);
+        let mut found = best.estimate(observed, rival.as_ref(), is_unsolved);
+        if contradicting.is_some() {
+            (found.warnings).retain(|warning| *warning != InclusionWarning::UncertainInterface);
+            found.warnings.push(InclusionWarning::ContradictedInterface);
+        }
+        Ok(found)
+    }
+
+    /// The face that is not assumed, if its values are clearly more likely than those of the fit.
+    fn contradicting(
+        &self,
+        observed: &Observed,
+        assumed: &Hypothesis,
+        counter: &mut Counter<'_>,
+    ) -> Option<Interface> {
+        let other = match assumed.interface {
+            Interface::Bonded => Interface::Frictionless,
+            Interface::Frictionless => Interface::Bonded,
+        };
+        let fit = assumed.better();
+        let forward = Forward {
+            interface: other,
+            ..assumed.problem.forward.clone()
+        };
+        let values = counter.step().then(|| {
+            let forward = forward.with_plain(&fit.parameters)?;
+            forward.predict(&fit.parameters)
+        });
+        let log_odds = Assessed::new(&assumed.problem, &fit.normal)?.log_odds(&values??);
+        (log_odds > CLEAR_EVIDENCE * assumed.inflation(observed)).then_some(other)
+    }
+
+    /// The best fits under each assumption about the face, the most likely first, and whether the
+    /// fits of one failed.
+    fn hypotheses(
+        &self,
+        observed: &Observed,
+        approaches_m: &[f64],
+        interfaces: &[Interface],
+        counter: &mut Counter<'_>,
+    ) -> (Vec<Hypothesis>, bool) {
+        let blocks: Vec<HomogeneousFit> = (interfaces.iter())
+            .filter_map(|face| self.homogeneous(observed, approaches_m, *face, counter))
             .collect();
         // If the better-fitting homogeneous block needs no inclusion, an inclusion in the other
         // would compensate for a wrong assumption about the face.
@@ -251,7 +321,7 @@ impl InclusionSearch {
                     approaches_m,
                     homogeneous,
                     candidates.first(),
-                    &mut counter,
+                    counter,
                 )
             });
         }
@@ -265,31 +335,12 @@ impl InclusionSearch {
         for first_fits in candidates {
             let needed = (hypotheses.first())
                 .map_or(f64::NEG_INFINITY, |best| best.evidence() - RIVAL_EVIDENCE);
-            let found = self.hypothesis(observed, approaches_m, first_fits, needed, &mut counter);
+            let found = self.hypothesis(observed, approaches_m, first_fits, needed, counter);
             is_unsolved |= found.is_none();
             hypotheses.extend(found);
         }
         hypotheses.sort_by(|a, b| b.evidence().total_cmp(&a.evidence()));
-        let pair = self.pair(observed, approaches_m, &hypotheses, &mut counter);
-        if let Some(pair) = pair.filter(|_| !counter.cancelled) {
-            return Ok(pair);
-        }
-        let best = (hypotheses.iter()).map(Hypothesis::evidence);
-        let needed = best.fold(f64::NEG_INFINITY, f64::max) - RIVAL_EVIDENCE;
-        for hypothesis in &mut hypotheses {
-            if hypothesis.evidence() > needed {
-                hypothesis.follow(|| counter.step());
-            }
-        }
-        if counter.cancelled {
-            return Err(ElasticityError::Cancelled);
-        }
-        hypotheses.sort_by(|a, b| b.evidence().total_cmp(&a.evidence()));
-        let mut hypotheses = hypotheses.into_iter();
-        let best = hypotheses.next().ok_or(ElasticityError::NoSolution)?;
-        let clear = CLEAR_EVIDENCE * best.inflation(observed);
-        let rival = (hypotheses.next()).filter(|other| best.evidence() - other.evidence() < clear);
-        Ok(best.estimate(observed, rival.as_ref(), is_unsolved))
+        (hypotheses, is_unsolved)
     }
 
     /// The values of all presses, with the approaches of each.
@@ -346,6 +397,20 @@ impl InclusionSearch {
         })
     }
 
+    /// Priors of the effects of each approach's own error, if there is one. Pressures are nearly
+    /// proportional to the approach.
+    pub(crate) fn approach_priors(&self, presses: usize, approaches_m: &[f64]) -> Vec<Prior> {
+        let error_m = self.specimen.each_approach_error_m();
+        let all = approaches_m
+            .iter()
+            .cycle()
+            .take(presses * approaches_m.len());
+        let priors = all.filter(|_| error_m > 0.0).enumerate();
+        priors
+            .map(|(k, approach)| Prior::new(Coordinate::Pressed(k), (0.0, error_m / approach)))
+            .collect()
+    }
+
     pub(crate) fn forward(
         &self,
         observed: &Observed,
@@ -384,6 +449,7 @@ impl InclusionSearch {
             },
             second: None,
             strayed_m: Vec::new(),
+            pressed: Vec::new(),
             zero_m: 0.0,
             height_m: self.specimen.height_m(),
             poisson_ratio: self.specimen.poisson_ratio().min(LARGEST_POISSON_RATIO),
@@ -454,7 +520,13 @@ impl InclusionSearch {
         &self.sensor
     }
 
-    pub(crate) fn specimen(&self) -> &TissueBlock {
+    /// The guide.
+    pub fn guide(&self) -> &Guide {
+        &self.guide
+    }
+
+    /// The block.
+    pub fn specimen(&self) -> &TissueBlock {
         &self.specimen
     }
 
@@ -530,6 +602,8 @@ impl InclusionSearch {
                 .cholesky()?,
             priors: self.block_priors(guess),
         };
+        let presses = (observed.cells.as_ref()).map_or(1, |cells| cells.positions.axes_m.len());
+        (problem.priors).extend(self.approach_priors(presses, approaches_m));
         let block = self.known_block(guess);
         let (_, start) = problem.scaled_start(&block, &forward.predict(&block)?)?;
         let fit = problem.fit(&start, FIRST_FIT_ENDING, || counter.step())?;
@@ -547,7 +621,7 @@ impl InclusionSearch {
         };
         let linear = linear.with_plain(&known)?;
         let grid = starts(&linear, &known, counter)?;
-        let settled = if fit.misfit < DOUBTFUL * observed.values.len() as f64 {
+        let settled = if fit.normal.misfit < DOUBTFUL * observed.values.len() as f64 {
             self.settled(&problem, &fit, observed, &grid, counter)
         } else {
             None
@@ -649,7 +723,7 @@ impl FirstFits {
 
     /// Log-evidence of the first fits below which another assumption about the face is discarded.
     fn hopeless(&self) -> f64 {
-        self.evidence() - HOPELESS_EVIDENCE - HOPELESS_MISFIT * self.better().misfit
+        self.evidence() - HOPELESS_EVIDENCE - HOPELESS_MISFIT * self.better().normal.misfit
     }
 }
 
@@ -705,6 +779,10 @@ impl InclusionSearch {
             lump,
         } = first_fits;
         let with_lump = core::mem::take(&mut problem.priors);
+        let of_block = with_lump
+            .iter()
+            .filter(|prior| prior.coordinate.is_of_block());
+        let homogeneous_priors: Vec<Prior> = of_block.copied().collect();
         let gain = (lump.as_ref()).map_or(f64::NEG_INFINITY, |lump| {
             lump.evidence - homogeneous.evidence
         });
@@ -715,9 +793,8 @@ impl InclusionSearch {
             .with_plain((lump.as_ref()).map_or(&homogeneous.parameters, |lump| &lump.parameters))?;
         let observed = &match &lump {
             Some(fit) => {
-                let centre = fit.parameters.place.centre_m;
-                let lift = problem.forward.lift(&fit.solved);
-                observed.with_lump_aside(centre, &problem.forward, lift)
+                let solved = &fit.normal.solved;
+                observed.with_lump_aside(&fit.parameters, &problem.forward, solved)?
             }
             None => observed.clone(),
         };
@@ -727,7 +804,7 @@ impl InclusionSearch {
             Some(settled) => settled,
             None if is_certain => homogeneous,
             None => {
-                problem.priors = with_lump[..BLOCK_COORDINATES].to_vec();
+                problem.priors = homogeneous_priors;
                 problem.fit(&homogeneous.parameters, ANSWER_ENDING, || counter.step())?
             }
         };
@@ -735,7 +812,7 @@ impl InclusionSearch {
         let ending = if is_certain {
             ANSWER_ENDING
         } else {
-            ANSWER_ENDING.below(homogeneous.objective() - LEAST_GAIN)
+            ANSWER_ENDING.below(homogeneous.normal.objective() - LEAST_GAIN)
         };
         let lump = lump.and_then(|fit| {
             let ending = ending.below(problem.objective_at(needed, fit.volume));

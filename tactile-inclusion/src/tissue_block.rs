@@ -27,6 +27,7 @@ pub struct TissueBlock {
     poisson_ratio: f64,
     poisson_ratio_error: f64,
     approach_error_m: f64,
+    each_approach_error_m: f64,
     /// ln E₀ and its standard error.
     block_modulus: Option<(f64, f64)>,
     interface: Option<Interface>,
@@ -49,6 +50,7 @@ impl TissueBlock {
             poisson_ratio: 0.495,
             poisson_ratio_error: 0.005,
             approach_error_m: 20e-6,
+            each_approach_error_m: 0.0,
             block_modulus: None,
             interface: None,
         })
@@ -81,6 +83,16 @@ impl TissueBlock {
     /// An error for a value that is not positive.
     pub fn with_approach_error_m(mut self, error_m: f64) -> Result<Self, ElasticityError> {
         self.approach_error_m = Quantity::StandardError.positive(error_m)?;
+        Ok(self)
+    }
+
+    /// Sets the standard error of each approach on its own, in metres, in addition to that of their
+    /// common zero: 0 (the default) for a stage, 0.2 mm for a hand that presses to a mark.
+    ///
+    /// # Errors
+    /// An error for a negative value or NaN.
+    pub fn with_each_approach_error_m(mut self, error_m: f64) -> Result<Self, ElasticityError> {
+        self.each_approach_error_m = Quantity::StandardError.not_negative(error_m)?;
         Ok(self)
     }
 
@@ -118,6 +130,10 @@ impl TissueBlock {
 
     pub(crate) fn poisson_ratio(&self) -> f64 {
         self.poisson_ratio
+    }
+
+    pub(crate) fn each_approach_error_m(&self) -> f64 {
+        self.each_approach_error_m
     }
 
     pub(crate) fn block_modulus(&self) -> Option<(f64, f64)> {
@@ -159,6 +175,9 @@ pub struct SensorErrors {
     pub correlation_m: f64,
     /// Relative standard error of the force.
     pub force: f64,
+    /// Standard error of the zero of the pressure, in pascals, common to all pixels and frames: the
+    /// reference frame's error of rounding, 0.29 grey levels if it is even and without noise.
+    pub zero_pa: f64,
     /// Fraction of the finite elements' own error (the deviation from another code) that is
     /// included: 1. With 0 the result contains only the uncertainty of the sensor, as in published
     /// bounds.
@@ -166,14 +185,15 @@ pub struct SensorErrors {
 }
 
 impl Default for SensorErrors {
-    /// 0.3 % in common and 0.1 % for each frame, correlated over 3 mm; 0.1 % of the force; and the
-    /// error of the model.
+    /// 0.3 % in common and 0.1 % for each frame, correlated over 3 mm; 0.1 % of the force; no error
+    /// of the zero; and the error of the model.
     fn default() -> Self {
         Self {
             common: 3e-3,
             each_frame: 1e-3,
             correlation_m: 3e-3,
             force: 1e-3,
+            zero_pa: 0.0,
             model: 1.0,
         }
     }
@@ -185,6 +205,7 @@ impl SensorErrors {
         Quantity::StandardError.not_negative(self.each_frame)?;
         Quantity::Distance.positive(self.correlation_m)?;
         Quantity::StandardError.positive(self.force)?;
+        Quantity::StandardError.not_negative(self.zero_pa)?;
         Quantity::StandardError.not_negative(self.model)?;
         Ok(self)
     }

@@ -262,6 +262,13 @@ pub(crate) fn kept_vector<T: Element>(py: Python<'_>, values: Vec<T>) -> Vector<
     kept(py, Array1::from_vec(values))
 }
 
+/// Rows of equal length.
+pub(crate) fn kept_rows<R: AsRef<[f64]>>(py: Python<'_>, rows: &[R]) -> Matrix<f64> {
+    let columns = rows.first().map_or(0, |row| row.as_ref().len());
+    let at = |(i, j): (usize, usize)| rows[i].as_ref()[j];
+    kept(py, Array2::from_shape_fn((rows.len(), columns), at))
+}
+
 pub(crate) fn kept_tensor(py: Python<'_>, tensor: &Matrix3<f64>) -> Matrix<f64> {
     kept(py, Array2::from_shape_fn((3, 3), |(i, j)| tensor[(i, j)]))
 }

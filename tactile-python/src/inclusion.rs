@@ -2,7 +2,7 @@
 use crate::arrays;
 use crate::errors::{self, Signals, invalid};
 use crate::pipeline::guide;
-use crate::results::{Estimate, Inclusion, Lump};
+use crate::results::{Estimate, HiddenLumps, Inclusion, Lump};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use tactile_files::scene::InclusionScene;
@@ -14,21 +14,54 @@ use tactile_imaging::inclusion::{
 };
 use tactile_imaging::pipeline::with_error;
 
-/// Searches for a lump in a block with the frames of a scene file, like `tactile inclusion`.
+/// Searches for a lump in a block with the frames of a scene file, like `tactile inclusion`. The scene
+/// may have several presses at stated positions.
+///
+/// Parameters
+/// ----------
+/// path : path
+///     The scene file.
+/// hidden : float
+///     If given, the result also has the largest balls that would not be found. It is the ratio of
+///     their modulus to that of the tissue.
 ///
 /// Raises
 /// ------
 /// OSError, ValueError
 ///     A file that cannot be read or used.
 #[pyfunction]
-pub(crate) fn inclusion_of_scene(py: Python<'_>, path: PathBuf) -> PyResult<Inclusion> {
+#[pyo3(signature = (path, *, hidden=None))]
+pub(crate) fn inclusion_of_scene(
+    py: Python<'_>,
+    path: PathBuf,
+    hidden: Option<f64>,
+) -> PyResult<Inclusion> {
     let scene = InclusionScene::read(path).map_err(errors::file)?;
     let loaded = py.detach(|| scene.load()).map_err(errors::file)?;
-    let search = InclusionSearch::new(scene.specimen, scene.guide).map_err(invalid)?;
     let mut signals = Signals::new();
-    let found = py.detach(|| loaded.search(&search, &mut |_| signals.check()));
+    let found = py.detach(|| loaded.estimate(&mut |_| signals.check()));
     signals.finish()?;
-    result(py, &found.map_err(errors::refused)?)
+    let mut found = result(py, &found.map_err(errors::refused)?)?;
+    if let Some(contrast) = hidden {
+        let hidden = py.detach(|| loaded.hidden(contrast, &mut |_| signals.check()));
+        signals.finish()?;
+        let hidden = hidden.map_err(errors::refused)?;
+        found.hidden = Some(Py::new(
+            py,
+            HiddenLumps {
+                text: format!(
+                    "{} positions, {} depths",
+                    hidden.positions_m.len(),
+                    hidden.depths_m.len()
+                ),
+                positions: arrays::kept_rows(py, &hidden.positions_m),
+                diameters: arrays::kept_rows(py, &hidden.diameters_m),
+                depths: arrays::kept_vector(py, hidden.depths_m),
+                next_position: hidden.next_position_m.map(|[x, y]| (x, y)),
+            },
+        )?);
+    }
+    Ok(found)
 }
 
 /// Searches for a lump in a block onto which a round guide was pressed.
@@ -154,6 +187,7 @@ fn result(py: Python<'_>, found: &InclusionEstimate) -> PyResult<Inclusion> {
             Interface::Bonded => "bonded".into(),
             _ => "frictionless".into(),
         },
+        hidden: None,
         flags: found.warnings.iter().map(ToString::to_string).collect(),
     })
 }

@@ -47,8 +47,8 @@ mod _native {
     use super::press::{Press, Session};
     #[pymodule_export]
     use super::results::{
-        Contact, Estimate, GelContact, GelReport, HertzContact, Inclusion, Load, Lump, Markers,
-        Match, Modulus, SimulatedPress, Strain, StrainBetween, StrainGrid, Surface,
+        Contact, Estimate, GelContact, GelReport, HertzContact, HiddenLumps, Inclusion, Load, Lump,
+        Markers, Match, Modulus, SimulatedPress, Strain, StrainBetween, StrainGrid, Surface,
     };
     #[pymodule_export]
     use super::run_program;

@@ -608,8 +608,24 @@ result! {
         /// "bonded" or "frictionless": whether the face of the guide sticks to the block or slides on
         /// it.
         interface: String,
+        /// The largest balls that would not be found. None unless they were asked for.
+        hidden: Option<Py<HiddenLumps>>,
         /// Doubts about the result, one sentence each.
         flags: Vec<String>,
+    }
+}
+
+result! {
+    /// The largest balls in a block that a search would not find.
+    HiddenLumps {
+        /// Positions of their centres in metres, (n, 2).
+        positions: Matrix<f64>,
+        /// Depths of their tops in metres, (k,).
+        depths: Vector<f64>,
+        /// Diameters in metres by depth and position, (k, n). Infinite if no ball would be found.
+        diameters: Matrix<f64>,
+        /// Position in metres where the next press would search most. None if there is no place.
+        next_position: Option<(f64, f64)>,
     }
 }
 

@@ -14,7 +14,7 @@ use tactile_imaging::fem::{Guide, GuideLayer, Interface, Material};
 use tactile_imaging::force::{LinearCalibration, StressCalibration};
 use tactile_imaging::inclusion::{
     FaceCells, InclusionEstimate, InclusionSearch, PressureProfile, Progress, RingMeans, Scan,
-    ScanPress, TissueBlock, asymmetry_warnings, ring_means,
+    ScanPress, SensorErrors, TissueBlock, asymmetry_warnings, ring_means, rounding_error,
 };
 
 /// Position error of a press in metres if the file states none. It is typical of placing the guide
@@ -99,6 +99,8 @@ struct Frame {
 /// ```
 #[derive(Clone, Debug)]
 pub struct LoadedInclusion {
+    /// The search in the scene's block, with the error of rounding of its reference frame.
+    pub search: InclusionSearch,
     /// Ring means of each frame, one press after the other.
     pub rings: Vec<RingMeans>,
     /// Pressure profiles of the first press, at the radii of its first frame, for the search.
@@ -131,16 +133,15 @@ impl LoadedInclusion {
     ///
     /// # Errors
     /// The errors of [`InclusionSearch::search_with_progress`].
-    pub fn search(
+    pub fn estimate(
         &self,
-        search: &InclusionSearch,
         progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<InclusionEstimate, ElasticityError> {
         if self.is_axial() {
             let radii_m = &self.rings[0].radii_m;
-            search.search_with_progress(radii_m, &self.profiles, progress)
+            (self.search).search_with_progress(radii_m, &self.profiles, progress)
         } else {
-            search.search_scan(&self.scan, progress)
+            self.search.search_scan(&self.scan, progress)
         }
     }
 }
@@ -238,6 +239,7 @@ impl InclusionScene {
             position_error_m: self.position_error_m,
         };
         let is_scan = self.presses.len() > 1;
+        let mut zero_pa: f64 = 0.0;
         for (index, press) in self.presses.iter().enumerate() {
             let first = rings.len();
             let mut images = Vec::with_capacity(press.frames.len());
@@ -254,6 +256,7 @@ impl InclusionScene {
                         let reason = "without a [calibration] every frame needs its force";
                         FileError::field(&self.file, field("force_N"), reason)
                     })?;
+                zero_pa = zero_pa.max(rounding_error(&reference.view()) * newtons / area);
                 let (size, face) = (self.pixel_size_m, self.guide.radius_m());
                 let means = ring_means(&brightening.view(), size, newtons / area, face);
                 rings.push(
@@ -273,7 +276,15 @@ impl InclusionScene {
             let force_n = frame.force_n.filter(|_| newtons_per_grey.is_some());
             means.profile(&radii, frame.approach_m, force_n)
         });
+        let errors = SensorErrors {
+            zero_pa,
+            ..SensorErrors::default()
+        };
+        let search = InclusionSearch::new(self.specimen, self.guide.clone())
+            .and_then(|search| search.with_sensor_errors(errors))
+            .map_err(|error| FileError::field(&self.file, "object", error))?;
         Ok(LoadedInclusion {
+            search,
             profiles: profiles.collect(),
             rings,
             scan,
@@ -388,6 +399,8 @@ struct BlockTable {
     youngs_modulus_error_pa: Option<f64>,
     #[serde(default, deserialize_with = "positive")]
     approach_error_m: Option<f64>,
+    #[serde(default, deserialize_with = "not_negative")]
+    each_approach_error_m: Option<f64>,
     interface: Option<InterfaceName>,
 }
 
@@ -418,6 +431,9 @@ impl BlockTable {
         }
         if let Some(error) = self.approach_error_m {
             specimen = specimen.with_approach_error_m(error)?;
+        }
+        if let Some(error) = self.each_approach_error_m {
+            specimen = specimen.with_each_approach_error_m(error)?;
         }
         if self.poisson_ratio.is_some() || self.poisson_ratio_error.is_some() {
             let ratio = self.poisson_ratio.unwrap_or(0.495);

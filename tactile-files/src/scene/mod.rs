@@ -108,6 +108,7 @@
 //! Fields counted in errors (`frames[2]`) start at 1.
 mod data;
 mod file;
+mod hidden;
 #[cfg(feature = "inclusion")]
 mod inclusion;
 
@@ -116,6 +117,7 @@ pub use data::{LoadedCalibration, SceneData, doubt_of_depths, doubt_of_pairs};
 pub use file::solve_contact_table;
 pub use file::{CalibrationSource, Scene, SceneCheck, SceneFrame, SceneLayer, read_contact_table};
 #[cfg(feature = "inclusion")]
+pub use hidden::HiddenLumps;
 pub use inclusion::{InclusionScene, LoadedInclusion};
 
 pub(crate) use file::{elastic_layers, guide, refractive_index};

@@ -1,7 +1,7 @@
 //! Errors of the inclusion search on a folder of solved scenes, compared with the Cramér–Rao bound.
 //!
 //! ```text
-//! cargo run --release -p tactile-inclusion --example inclusion_study -- FOLDER [SEEDS] [NAMES] [balls] [KERNEL]
+//! cargo run --release -p tactile-inclusion --example inclusion_study -- FOLDER [SEEDS] [NAMES] [balls] [FACE] [KERNEL]
 //! ```
 //!
 //! FOLDER contains `scenes.csv` (scene, D_m, depth_m, E1_pa, E0_pa, block_height_m, block_radius_m,
@@ -14,7 +14,8 @@
 //! pixels, smooth errors of the calibration, and errors of the force, of the height of the block
 //! and of the zero of the approaches. Poisson's ratio is stated as 0.495 ± 0.005 for every scene.
 //! NAMES selects the scenes whose names begin with one of them, separated by commas. With `balls`,
-//! the search assumes that an inclusion is a ball.
+//! the search assumes that an inclusion is a ball. FACE is `stated` if the search is given the true
+//! contact condition, and `misstated` if it is given the other.
 //!
 //! KERNEL draws the errors of the calibration differently from the model of the search: `1mm` and
 //! `6mm` with another correlation length, `vignetting` as the square of the radius, and `speckle`
@@ -30,6 +31,7 @@ use scenes::{SolvedScene, scenes};
 use shared::{guide, normal, wave};
 use std::error::Error;
 use std::path::Path;
+use tactile_fem::Interface;
 use tactile_inclusion::{
     AssumedInclusion, ExpectedErrors, InclusionSearch, PressureProfile, SensorErrors, TissueBlock,
 };
@@ -181,16 +183,19 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let folder = arguments
         .next()
-        .ok_or("usage: FOLDER [SEEDS] [NAMES] [balls] [KERNEL]")?;
+        .ok_or("usage: FOLDER [SEEDS] [NAMES] [balls] [FACE] [KERNEL]")?;
     let seeds: u64 = arguments.next().map_or(Ok(1), |text| text.parse())?;
     let names = arguments.next().unwrap_or_default();
     let mut is_ball = false;
+    let mut is_stated_well = None;
     let mut kernel = Kernel::Smooth(SensorErrors::default().correlation_m, 1.0);
     for word in arguments {
         match Kernel::named(&word) {
             Some(named) => kernel = named,
             None if word == "balls" => is_ball = true,
-            None => return Err(format!("{word} is neither balls nor a kernel").into()),
+            None if word == "stated" => is_stated_well = Some(true),
+            None if word == "misstated" => is_stated_well = Some(false),
+            None => return Err(format!("{word} is neither balls, a face nor a kernel").into()),
         }
     }
     let mut tally = Tally::default();
@@ -210,6 +215,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         };
         for seed in 0..seeds {
             let (specimen, frames) = measured(scene, seed * 1000 + index as u64, kernel)?;
+            let specimen = match is_stated_well {
+                Some(true) => specimen.with_interface(scene.interface),
+                Some(false) => specimen.with_interface(match scene.interface {
+                    Interface::Bonded => Interface::Frictionless,
+                    Interface::Frictionless => Interface::Bonded,
+                }),
+                None => specimen,
+            };
             let search = InclusionSearch::new(specimen, guide(scene.face_radius_m)?)?;
             let search = if is_ball {
                 search.with_shape_error(0.0)?

@@ -142,6 +142,18 @@ fn an_inclusion_is_found_and_the_told_is_right() {
         let estimate = searched(&frames(&bonded(Some(truth))));
         assert!(estimate.found && !is_poor(&estimate), "{estimate:?}");
         assert!(told_is_right(&estimate, truth), "{estimate:?}");
+        let is_contradicted = |estimate: &InclusionEstimate| {
+            (estimate.warnings).contains(&InclusionWarning::ContradictedInterface)
+        };
+        assert!(!is_contradicted(&estimate), "{estimate:?}");
+        // The wrong face is stated. The pressure of the small deep inclusion does not show it.
+        let sliding = specimen().with_interface(Interface::Frictionless);
+        let estimate = searched_in(&sliding, &frames(&bonded(Some(truth))));
+        assert!(told_is_right(&estimate, truth), "{estimate:?}");
+        assert!(
+            truth.diameter_m < 8e-3 || is_contradicted(&estimate),
+            "{estimate:?}"
+        );
     }
 }
 

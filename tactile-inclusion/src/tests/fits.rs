@@ -57,7 +57,11 @@ fn a_fit_from_afar_ends_at_the_truth_within_its_errors() {
         assert!(z.abs() < 0.7, "{coordinate:?}: {z}");
     }
     // The covariance includes the error of the coarse mesh.
-    assert!(fit.misfit < fit.predicted.len() as f64, "{}", fit.misfit);
+    assert!(
+        fit.normal.misfit < fit.normal.predicted.len() as f64,
+        "{}",
+        fit.normal.misfit
+    );
 }
 
 #[test]
@@ -72,7 +76,11 @@ fn a_fit_goes_on_along_the_limit_of_poissons_ratio() {
     let fit = problem.fit(&start, ANSWER_ENDING, || true).unwrap();
     assert!(fit.converged);
     // The same bound as for the distant start.
-    assert!(fit.misfit < fit.predicted.len() as f64, "{}", fit.misfit);
+    assert!(
+        fit.normal.misfit < fit.normal.predicted.len() as f64,
+        "{}",
+        fit.normal.misfit
+    );
 }
 
 /// For a small deep inclusion that is slightly stiffer than the tissue, the ridge bends.

@@ -54,6 +54,7 @@ fn block() -> Parameters {
         place: Place::default(),
         second: None,
         strayed_m: vec![],
+        pressed: vec![],
         zero_m: 0.0,
         height_m: 30e-3,
         poisson_ratio: 0.49,

@@ -19,6 +19,7 @@ __all__ = [
     "GelReport",
     "GelSensor",
     "HertzContact",
+    "HiddenLumps",
     "Inclusion",
     "Lump",
     "Load",
@@ -426,7 +427,20 @@ class Inclusion(_Result):
     @property
     def interface(self) -> str: ...
     @property
+    def hidden(self) -> HiddenLumps | None: ...
+    @property
     def flags(self) -> list[str]: ...
+
+@final
+class HiddenLumps(_Result):
+    @property
+    def positions(self) -> NDArray[np.float64]: ...
+    @property
+    def depths(self) -> NDArray[np.float64]: ...
+    @property
+    def diameters(self) -> NDArray[np.float64]: ...
+    @property
+    def next_position(self) -> tuple[float, float] | None: ...
 
 @final
 class SimulatedPress(_Result):
@@ -644,7 +658,9 @@ def inclusion(
     interface: str | None = None,
     youngs_modulus: tuple[float, float] | None = None,
 ) -> Inclusion: ...
-def inclusion_of_scene(path: str | PathLike[str]) -> Inclusion: ...
+def inclusion_of_scene(
+    path: str | PathLike[str], *, hidden: float | None = None
+) -> Inclusion: ...
 def integrate(
     slope_x: ArrayLike,
     slope_y: ArrayLike,
