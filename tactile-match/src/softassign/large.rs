@@ -67,6 +67,9 @@ impl AnnealedSoftassign {
                     ..FAST
                 });
                 flow = refine(ws, run, flow, watch);
+                if ws.gives_up {
+                    flow?;
+                }
                 ws.state.tail = ws.annealer.tail(0.1 * ws.spacing);
                 ws.best.copy_from(&ws.state);
                 ws.annealer
@@ -78,6 +81,9 @@ impl AnnealedSoftassign {
         }
         if stride > 0 {
             flow = self.coarsest(ws, &mut levels, stride, watch);
+            if ws.gives_up {
+                flow?;
+            }
         }
         while stride > 1 {
             // First temperature of a level, in spacings of the coarser level.
@@ -111,6 +117,9 @@ impl AnnealedSoftassign {
                 })
             };
             flow = refine(ws, run, flow, watch);
+            if ws.gives_up {
+                flow?;
+            }
         }
         // A run below the noise temperature has lost pairs: repeat it with the temperature set by
         // the residuals.
@@ -124,6 +133,9 @@ impl AnnealedSoftassign {
                 ..FAST
             });
             flow = refine(ws, run, flow, watch);
+            if ws.gives_up {
+                flow?;
+            }
         }
         let schedule = self.schedule(FAST);
         let noisy = ws.state.sigma > ws.annealer.clean_sigma;

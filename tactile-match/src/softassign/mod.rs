@@ -50,7 +50,7 @@ pub use options::{AnnealedSoftassign, Outliers, Rotation, Search, Transformation
 pub use result::SoftassignMatch;
 
 use crate::frame::centre_and_radius;
-use crate::{Doubt, MatchError, MatchedPairs, Matching, WarmStart, error};
+use crate::{Doubt, MatchError, MatchedPairs, Matching, StopReason, WarmStart, Watch, error};
 use confidence::Answer;
 use correspond::Correspondence;
 use fine::FineFit;
@@ -122,6 +122,8 @@ pub struct SoftassignWorkspace<const D: usize> {
     rows: Vec<usize>,
     starts: usize,
     stopped: bool,
+    /// Whether a search that is stopped ends at once, without an answer.
+    gives_up: bool,
     /// Whether all rotations are allowed and one maps the model onto itself.
     symmetric: bool,
     /// A rival that fits the targets better than the answer but is excluded by the options, and its
@@ -241,11 +243,20 @@ impl AnnealedSoftassign {
         &self,
         model: &[Point<f64, D>],
         target: &[Point<f64, D>],
-        watch: &mut dyn FnMut() -> ControlFlow<()>,
+        watch: Watch<'_>,
     ) -> Result<Matching<D>, MatchError> {
-        let mut workspace = SoftassignWorkspace::default();
-        let found = self.match_points_with(&mut workspace, model, target, watch)?;
-        Ok(found.to_matching(model))
+        let mut workspace = SoftassignWorkspace {
+            gives_up: true,
+            ..SoftassignWorkspace::default()
+        };
+        workspace.take(model, target)?;
+        self.search_in(&mut workspace, watch)?;
+        if workspace.stopped {
+            let mut found = Matching::from_pairs(model, target, &[])?;
+            found.report.stop = StopReason::Cancelled;
+            return Ok(found);
+        }
+        Ok(SoftassignMatch::of(&workspace).to_matching(model))
     }
 
     pub(crate) fn next<const D: usize>(

@@ -140,7 +140,7 @@ enum Start<const D: usize> {
 impl AnnealedSoftassign {
     pub(crate) fn solve<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>, watch: Watch<'_>) {
         self.begin(ws);
-        let mut flow = if self.is_large(ws) {
+        let flow = if self.is_large(ws) {
             self.solve_coarse_to_fine(ws, watch)
         } else {
             self.prepare(ws);
@@ -149,11 +149,14 @@ impl AnnealedSoftassign {
                 Search::Thorough => self.search(ws, watch),
             }
         };
-        if flow.is_break() && ws.starts == 0 {
-            // Stopped before the first iteration, which is then the answer.
-            flow = self.run(ws, Start::Centred, NEAR, &mut || ControlFlow::Break(()));
-        }
         ws.stopped = flow.is_break();
+        if ws.stopped && ws.gives_up {
+            return;
+        }
+        if ws.stopped && ws.starts == 0 {
+            // Stopped before the first iteration, which is then the answer.
+            let _ = self.run(ws, Start::Centred, NEAR, &mut || ControlFlow::Break(()));
+        }
         self.conclude(ws);
     }
 
