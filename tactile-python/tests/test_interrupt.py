@@ -21,6 +21,9 @@ LONG = {
     "labelling": ("", "ti.match_points(points(400), points(400, 1), 'relaxation-labelling')"),
     "drift": ("", "ti.match_points(points(8000), points(8000, 1), 'coherent-point-drift', max_iterations=10_000, tolerance=0.0)"),
     "strain": ("", "ti.strain_between(points(300_000), points(300_000) + 0.1 * points(300_000, 1), paired=True)"),
+    "assignment": ("", "ti.match_points(points(6000), points(6000, 1), 'linear-assignment')"),
+    "moved": ("found = ti.match_points(points(3000), points(3000) + 1e-4, 'nearest-neighbour')", "found.transform(points(3_000_000))"),
+    "cross-validation": ("", "ti.ThinPlateSpline(points(3000), points(3000, 1), smoothing='gcv')"),
     "spline": ("", "ti.ThinPlateSpline(points(200_000), points(200_000, 1))"),
     "values": ("spline = ti.ThinPlateSpline(points(1000), points(1000))", "spline(points(10_000_000))"),
     "own": (
