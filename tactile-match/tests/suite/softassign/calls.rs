@@ -34,6 +34,30 @@ fn the_callback_stops_the_search() {
     assert!(found.report.iterations <= 4);
 }
 
+#[test]
+fn a_match_that_is_stopped_has_no_pairs() {
+    // The larger sets are matched coarse to fine.
+    for points in [60, 4100] {
+        let scene = Scene::<2>::bent(points, 0.06, 23);
+        for last in [1, 3] {
+            let mut heard = 0;
+            let mut watch = || {
+                heard += 1;
+                match heard >= last {
+                    true => ControlFlow::Break(()),
+                    false => ControlFlow::Continue(()),
+                }
+            };
+            let matcher = AnnealedSoftassign::default();
+            let found = matcher.match_watched(&scene.model, &scene.target, &mut watch);
+            let found = found.unwrap();
+            assert_eq!(found.report.stop, StopReason::Cancelled);
+            assert!(found.assignment == vec![None; points] && found.warped.len() == points);
+            assert!(heard <= last + 1, "{heard} {last}");
+        }
+    }
+}
+
 /// Clean, noisy and unusable pairs of different sizes: the use of a workspace for one of them must
 /// not affect the next.
 #[test]
