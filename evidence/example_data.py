@@ -135,6 +135,7 @@ pixel_size_m = [{PIXEL_M}, {PIXEL_M}]
 
 [calibration]
 pairs = "calibration.csv"
+reference = "reference.png"
 
 {frames}{weight if check else ""}[object]
 shape = "sphere"
@@ -155,12 +156,15 @@ def skin_scene():
 # Calibration of the same kind of sensor: two rigid balls on one guide of 100 kPa, up and down again, in frames of 72 by 72 pixels.
 # (radius in metres, forces in newtons with the number of those while loading)
 BALLS = [(3e-3, [0.003, 0.006, 0.012, 0.02, 0.012, 0.006], 4), (6e-3, [0.005, 0.01, 0.02, 0.01], 3)]
-GUIDE_PA, SMALL = 100e3, 72
+SMALL = 72
+# Contact radii by `tactile_fem` on a guide of 100 kPa and 10 mm (Poisson's ratio 0.4999, no friction).
+CONTACT_M = {(3e-3, 0.003): 0.37154e-3, (3e-3, 0.006): 0.46833e-3, (3e-3, 0.012): 0.58967e-3, (3e-3, 0.02): 0.69905e-3,
+             (6e-3, 0.005): 0.55437e-3, (6e-3, 0.01): 0.69881e-3, (6e-3, 0.02): 0.88161e-3}
 
 
 def sensor_frame(ball_m, force, seed):
-    """Hertz's pressure of a rigid ball on the guide, which is incompressible and deep compared with the contact."""
-    a = (3 * force * ball_m / (4 * GUIDE_PA / 0.75)) ** (1 / 3) if force else 1.0
+    """Hertz's pressure of a rigid ball over its contact on the guide."""
+    a = CONTACT_M[ball_m, force] if force else 1.0
     peak = GREY_PER_PA * 3 * force / (2 * math.pi * a * a)
 
     def level(r, c):

@@ -3,12 +3,16 @@ use super::error::PipelineError;
 use crate::core::StopReason;
 use crate::force::{
     BoundingBox, Estimate, FaceReading, ForceError, ForceMeasurement, ForceWorkspace, LensGeometry,
-    LocalCalibration, Polarity, ProfileShape, ReferenceFrame, Uncertain,
+    LocalCalibration, PairsDoubt, Polarity, ProfileShape, ReferenceFrame, Uncertain,
 };
 use ndarray::{Array2, ArrayView2};
 use std::f64::consts::PI;
 use std::ops::Deref;
 use std::sync::Arc;
+
+/// A misfit below this fraction of the peak is that of a ball: blur, rounding to grey levels and the
+/// depth of a guide give 0.2 %.
+const LEAST_MISFIT: f64 = 0.01;
 
 /// Finds contact and force in one frame.
 ///
@@ -96,6 +100,11 @@ pub trait ContactStage: Send + Sync {
         false
     }
 
+    /// Doubts about the pairs from which the forces follow.
+    fn doubts(&self) -> &[PairsDoubt] {
+        &[]
+    }
+
     /// Whether a contact is brighter or darker than the reference.
     fn polarity(&self) -> Polarity {
         Polarity::Brighter
@@ -153,6 +162,10 @@ impl<P: Deref<Target: ContactStage> + Send + Sync> ContactStage for P {
 
     fn reads_light(&self) -> bool {
         (**self).reads_light()
+    }
+
+    fn doubts(&self) -> &[PairsDoubt] {
+        (**self).doubts()
     }
 
     fn polarity(&self) -> Polarity {
@@ -283,6 +296,24 @@ impl ContactReading {
         Some(self.force_n? / (self.contact_radius_m.powf(2.0) * PI))
     }
 
+    /// The force that exceeds this contact's by two standard errors, if the force is below its
+    /// error. The contact is then no load, and nothing else about it is worth a caution.
+    ///
+    /// ```
+    /// use tactile_imaging::{force::Estimate, pipeline::ContactReading};
+    /// let contact = |force| {
+    ///     ContactReading::new(Some(Estimate::new(force, 1e-3)), Estimate::exact(1e-3))
+    /// };
+    /// assert_eq!(contact(-0.2e-3).no_force_n(), Some(1.8e-3));
+    /// assert_eq!(contact(5e-3).no_force_n(), None);
+    /// ```
+    #[must_use]
+    pub fn no_force_n(&self) -> Option<f64> {
+        let force = self.force_n?.total();
+        let below = force.value < force.standard_error;
+        below.then_some(force.value + 2.0 * force.standard_error)
+    }
+
     /// The relative error of lengths that corresponds to a caution about the shape. If pixel sizes
     /// are misstated or a lens distorts, the longer half axis is wrong by the whole elongation and
     /// the mean of both by half of it. If the profile deviates by a fraction of its peak, the
@@ -305,7 +336,14 @@ impl ContactReading {
     pub(super) fn of_light(force: &ForceMeasurement) -> Option<Self> {
         let (contact, reading, radius) = (force.contact?, force.reading?, force.contact_radius_m?);
         let profile = force.profile;
-        let misfit = profile.filter(|p| p.shape == ProfileShape::NotHertz);
+        // An ellipse explains what varies around the centre.
+        let round = force.elongation.is_none();
+        let misfit = profile
+            .filter(|p| p.shape == ProfileShape::NotHertz)
+            .map(|p| {
+                let around = if round { p.azimuthal_misfit } else { 0.0 };
+                p.radial_misfit.hypot(around)
+            });
         Some(Self {
             force_n: Some(force.force_n),
             contact_radius_m: radius,
@@ -318,7 +356,7 @@ impl ContactReading {
             touches_edge: contact.touches_edge,
             other_contacts: contact.other_contacts,
             converged: profile.is_none_or(|p| p.stop == StopReason::Converged),
-            profile_misfit: misfit.map(|p| p.radial_misfit.hypot(p.azimuthal_misfit)),
+            profile_misfit: misfit.filter(|misfit| *misfit > LEAST_MISFIT),
             elongation: force.elongation,
             ..Self::new(None, radius.total())
         })

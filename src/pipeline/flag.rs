@@ -2,7 +2,7 @@
 use super::contact::ContactReading;
 use super::error::PipelineError;
 use crate::elasticity::modulus::Warning;
-use crate::force::Estimate;
+use crate::force::{Estimate, PairsDoubt};
 
 /// A caution about a result. Frames are counted from 0, as in the calls. It also implements
 /// [`Error`](std::error::Error), for callers that reject results with a caution.
@@ -113,17 +113,17 @@ pub enum Flag {
         /// Mean of frame minus reference without contact, in grey levels.
         grey: f64,
     },
-    /// The reference is brighter or darker than that of the calibration. Forces are divided by the
-    /// factor, whose error is included.
-    #[error(
-        "the reference is {:+.1} % brighter than the calibration's, unevenly by {:.1} %: forces \
-         are divided by that factor",
-        100.0 * change, 100.0 * uneven
-    )]
+    /// The light of the reference is not that of the calibration. Forces are divided by the factor of
+    /// the lamps, whose error is included.
+    #[error("{}", light_changed(*change, *change_error, *stray_grey, *uneven))]
     LightChanged {
-        /// The common factor minus one.
+        /// The factor of the lamps minus one.
         change: f64,
-        /// Deviation from a common factor, relative.
+        /// Its standard error.
+        change_error: f64,
+        /// Light added to that of the lamps, in grey levels. NaN if the background is too dark now.
+        stray_grey: f64,
+        /// Deviation from a common change, relative.
         uneven: f64,
     },
     /// The fit of the contact's profile did not converge.
@@ -193,6 +193,28 @@ pub enum Flag {
         frame: usize,
         /// Deviation of the pairs from a line at half scale, as a fraction of the full scale.
         departure: f64,
+    },
+    /// The calibration's pairs have a force without light. Every force has this standard error.
+    #[error(
+        "the calibration's pairs have a force of {offset_n:.4} N without light: was the gauge not \
+         zeroed, or do the sums contain other light?"
+    )]
+    GaugeNotZeroed {
+        /// The force without light, in newtons.
+        offset_n: f64,
+    },
+    /// One pair of the calibration is far from the line through the others.
+    #[error(
+        "a pair of the calibration has {force_n:.4} N, but the other pairs give {expected_n:.4} N: \
+         is it mistyped?"
+    )]
+    PairDeparts {
+        /// The pair, counted from 0.
+        pair: usize,
+        /// Its force in newtons.
+        force_n: f64,
+        /// The force of the line through the other pairs.
+        expected_n: f64,
     },
     /// The calibration and the gauge disagree by more than three standard errors and two per cent.
     #[error("frame {frame}: {measured_n:.4} N measured, but the gauge read {gauge_n:.4} N")]
@@ -360,6 +382,31 @@ impl Flag {
         let words = frame.and_then(|frame| message.strip_prefix(&frame).map(str::to_owned));
         words.unwrap_or(message)
     }
+
+    /// The caution about pairs of a calibration, for the first frame. `None` for a doubt without
+    /// one.
+    #[must_use]
+    pub fn of_pairs(doubt: &PairsDoubt) -> Option<Self> {
+        match *doubt {
+            PairsDoubt::Offset { offset_n } => Some(Self::GaugeNotZeroed {
+                offset_n: offset_n.value,
+            }),
+            PairsDoubt::Outlier {
+                pair,
+                force_n,
+                expected_n,
+            } => Some(Self::PairDeparts {
+                pair,
+                force_n,
+                expected_n,
+            }),
+            PairsDoubt::Bend { departure } => Some(Self::LightNotProportional {
+                frame: 0,
+                departure,
+            }),
+            _ => None,
+        }
+    }
 }
 
 /// Plausible mean stresses of contacts: silicone rubbers tear at several megapascals, and one grey
@@ -392,6 +439,7 @@ impl ContactReading {
         let [least, most] = GEL_STRESS_PA;
         let unlikely = stress.filter(|stress| !(least..=most).contains(&stress.abs()));
         let with = |holds: bool, flag: Flag| holds.then_some(flag);
+        let is_load = self.no_force_n().is_none();
         let flags = [
             with(share > 0.0, Flag::Saturated { frame, share }),
             with(self.out_of_calibration, Flag::OutOfCalibration { frame }),
@@ -409,7 +457,11 @@ impl ContactReading {
                 mean_stress_pa,
             }),
         ];
-        flags.into_iter().flatten().chain(unknown)
+        flags
+            .into_iter()
+            .flatten()
+            .filter(move |_| is_load)
+            .chain(unknown)
     }
 }
 
@@ -418,6 +470,21 @@ fn in_unit(quantity: &str, value: f64) -> String {
     match quantity {
         "force" => format!("{value:.1e} N"),
         _ => format!("{:.1e} mm", 1e3 * value),
+    }
+}
+
+/// Describes a change of the light.
+fn light_changed(change: f64, error: f64, stray_grey: f64, uneven: f64) -> String {
+    let [change, error, uneven] = [change, error, uneven].map(|share| 100.0 * share);
+    match stray_grey.is_nan() {
+        true => "the light of the calibration's reference is missing in this one: another black \
+                 level, or lamps that are off"
+            .to_owned(),
+        false => format!(
+            "the light has changed since the calibration's reference: lamps {change:+.1} ± \
+             {error:.1} %, by which forces are divided, other light {stray_grey:+.1} grey levels, \
+             unevenly by {uneven:.1} %"
+        ),
     }
 }
 

@@ -3,9 +3,8 @@ use super::contact::{ContactReading, ContactStage, FrameContact, resize};
 use super::error::PipelineError;
 use crate::force::{
     CalibrationPair, ForceError, ForceMeter, ForceOptions, ForceWorkspace, LensGeometry,
-    LinearCalibration, LocalCalibration, Polarity, ReferenceFrame, StressCalibration,
+    LinearCalibration, LocalCalibration, PairsDoubt, Polarity, ReferenceFrame, StressCalibration,
 };
-use nalgebra::{Matrix3, Vector3};
 use ndarray::ArrayView2;
 use std::sync::Arc;
 
@@ -51,8 +50,8 @@ pub struct LightContact {
     pixel_size_m: [f64; 2],
     polarity: Polarity,
     lens: Option<LensGeometry>,
-    /// Bend of the pairs to which a line was fitted.
-    calibration_bend: Option<f64>,
+    /// Doubts about the pairs to which a line was fitted.
+    doubts: Vec<PairsDoubt>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -84,7 +83,7 @@ impl LightContact {
     ) -> Result<Self, PipelineError> {
         let calibration = LinearCalibration::fit(pairs).map_err(PipelineError::Calibration)?;
         Ok(Self {
-            calibration_bend: bend_of(pairs),
+            doubts: calibration.report().doubts.clone(),
             ..Self::new(calibration, pixel_size_m, options)?
         })
     }
@@ -106,7 +105,7 @@ impl LightContact {
             pixel_size_m,
             polarity: options.polarity(),
             lens: None,
-            calibration_bend: None,
+            doubts: Vec::new(),
         })
     }
 
@@ -181,8 +180,12 @@ impl ContactStage for LightContact {
         let force =
             self.meter
                 .measure_with(workspace, frame, reference, self.calibration.as_ref())?;
+        let bend = self.doubts.iter().find_map(|doubt| match doubt {
+            PairsDoubt::Bend { departure } => Some(*departure),
+            _ => None,
+        });
         contact.reading = ContactReading::of_light(&force).map(|reading| ContactReading {
-            calibration_bend: self.calibration_bend,
+            calibration_bend: bend,
             ..reading
         });
         if let Some(reading) = &mut contact.reading
@@ -209,6 +212,10 @@ impl ContactStage for LightContact {
         Ok(())
     }
 
+    fn doubts(&self) -> &[PairsDoubt] {
+        &self.doubts
+    }
+
     fn polarity(&self) -> Polarity {
         self.polarity
     }
@@ -230,68 +237,5 @@ impl ContactStage for LightContact {
             meter: self.meter.clone().without_profile(),
             ..self.clone()
         }))
-    }
-}
-
-/// Deviation of a parabola through the pairs from its chord at half scale, as a fraction of the
-/// full scale. `None` if it is small or not significant within the scatter of the pairs. With light
-/// ∝ pᵉ under a ball of growing load, the sum is proportional to F^((2+e)/3), which is a line only
-/// for e = 1. O(pairs).
-fn bend_of(pairs: &[CalibrationPair]) -> Option<f64> {
-    let scale = |value: fn(&CalibrationPair) -> f64| {
-        pairs.iter().map(value).map(f64::abs).fold(0.0, f64::max)
-    };
-    let (sum, force) = (scale(|p| p.integrated_pixel_value), scale(|p| p.force_n));
-    // Minimum number of pairs: three parameters and three degrees of freedom.
-    if pairs.len() < 6 || !(sum > 0.0 && force > 0.0) {
-        return None;
-    }
-    let powers = |pair: &CalibrationPair| {
-        let v = pair.integrated_pixel_value / sum;
-        (Vector3::new(1.0, v, v * v), pair.force_n / force)
-    };
-    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    for (row, force) in pairs.iter().map(powers) {
-        normal += row * row.transpose();
-        right += row * force;
-    }
-    let inverse = normal.cholesky()?.inverse();
-    let parabola = inverse * right;
-    let squares = pairs.iter().map(powers);
-    let squares: f64 = squares
-        .map(|(row, force)| (force - row.dot(&parabola)).powi(2))
-        .sum();
-    let error = (squares / (pairs.len() - 3) as f64 * inverse[(2, 2)]).sqrt();
-    // c v² minus its chord c v is −c/4 at one half.
-    let departure = 0.25 * parabola[2].abs();
-    // Light ∝ p^0.95 or p^1.05 under a ball deviates by 0.6 % and changes the modulus by about 5 %.
-    // Five standard errors are significant.
-    (departure > 6e-3 && departure > 5.0 * 0.25 * error).then_some(departure)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Pairs with light ∝ pᵉ under a ball. The forces alternate by a fraction of the full scale to
-    /// either side.
-    fn pairs(exponent: f64, error: f64) -> Vec<CalibrationPair> {
-        let pair = |k: i32| {
-            let force = f64::from(k) / 12.0;
-            let noise = if k % 2 == 0 { error } else { -error };
-            CalibrationPair::loading(1e6 * force.powf((2.0 + exponent) / 3.0), force + noise)
-        };
-        (0..=12).map(pair).collect()
-    }
-
-    #[test]
-    fn light_that_is_not_proportional_bends_the_pairs() {
-        assert_eq!(bend_of(&pairs(1.0, 1e-3)), None);
-        for exponent in [0.8, 0.9, 1.1, 1.2] {
-            assert!(bend_of(&pairs(exponent, 1e-3)).is_some(), "p^{exponent}");
-        }
-        // The bend is hidden in the scatter; the second case has only three pairs.
-        assert_eq!(bend_of(&pairs(1.1, 0.02)), None);
-        assert_eq!(bend_of(&pairs(1.2, 0.0)[..3]), None);
     }
 }

@@ -71,7 +71,7 @@ impl Press<'_> {
             .collect();
         let step = self.light_step_grey().filter(|&grey| grey != 0.0);
         flags.extend(step.map(|grey| Flag::LightDrifted { grey }));
-        flags.extend(self.light_changed());
+        flags.extend(self.stages.standing_cautions());
         if let Ok(modulus) = &youngs_modulus_pa {
             let warnings = modulus.warnings.iter().copied();
             flags.extend(warnings.map(|warning| Flag::Assumption { warning }));
@@ -93,15 +93,6 @@ impl Press<'_> {
             flags,
             report: self.report(),
         }
-    }
-
-    /// A caution if the light of the reference differs from that of the calibration.
-    fn light_changed(&self) -> Option<Flag> {
-        let light = self.stages.light.filter(|light| light.seen)?;
-        Some(Flag::LightChanged {
-            change: light.gain.value - 1.0,
-            uneven: light.uneven,
-        })
     }
 
     /// A caution if a flat face is compressed so far that the law of its material matters.

@@ -1,14 +1,27 @@
 //! The light of the calibration's reference, and its change since then.
+use super::flag::Flag;
 use crate::force::{Estimate, ReferenceFrame};
 use ndarray::{ArrayView2, Axis, Slice};
 
 /// Blocks along each side of a frame.
 const BLOCKS: usize = 8;
 
+/// Blocks darker than this have clipped pixels.
+const CLIPPED_GREY: f64 = 1.0;
+
+/// The blocks' spread over that of their noise from which the background has a structure.
+const LEAST_STRUCTURE: f64 = 20.0;
+
+/// Standard error of ln g beside the structure's: lamps and other light may both have changed.
+const BOTH: f64 = 0.04;
+
+/// A factor with a larger error than this corrects nothing.
+const LARGEST_ERROR: f64 = 5e-3;
+
 /// Brightness of a reference in 8 × 8 blocks, stored with a calibration. Lamps and exposure change
 /// the background and the leaked light by one factor, so a later reference reveals the error of the
-/// forces. Stray room light changes only the background and, if the background is even, looks the
-/// same: a tenth of the change is therefore the error of the factor.
+/// forces. Room light and the black level only add to the background. An uneven background
+/// separates the two; with an even one the force has an error that covers both.
 ///
 /// ```
 /// use tactile_imaging::{Object, Pipeline, pipeline::ReferenceLight};
@@ -16,7 +29,7 @@ const BLOCKS: usize = 8;
 /// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
 /// let hertz = |level: f64, peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
 ///     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-///     (level * (20.0 + peak * (1.0 - d * d).sqrt())).round() as u8
+///     (level * (20.0 + c as f64 / 2.0 + peak * (1.0 - d * d).sqrt())).round() as u8
 /// });
 /// let calibrated = ReferenceFrame::new(hertz(1.0, 0.0).view())?;
 /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_settings(
@@ -65,30 +78,79 @@ impl ReferenceLight {
         }
     }
 
-    /// The change of the light since then. `None` if there is too little light to measure it.
+    /// The change of the light since then. `None` if the calibration had too little light to measure
+    /// it.
+    ///
+    /// Lamps and exposure multiply the light, room light and the black level add to it: now = g
+    /// then + b. Both are fitted to the blocks. The structure of the background determines g; how
+    /// well is its error. An even background leaves open which of the two changed: ln g is then
+    /// half of the logarithm of the ratio, with as much as its error.
     pub(super) fn changed(&self, now: &ReferenceFrame) -> Option<LightChange> {
         let now = Self::of(now);
-        let sum = |f: &dyn Fn(f64, f64) -> f64| -> f64 {
-            let both = self.grey.iter().zip(&now.grey);
-            both.map(|(then, now)| f(*then, *now)).sum()
-        };
-        let squares = sum(&|then, _| then * then);
-        let gain = sum(&|then, now| then * now) / squares;
-        let noise = now.error_grey.hypot(gain * self.error_grey);
-        let error = noise / squares.sqrt();
-        // A factor with an error above half a per cent corrects nothing.
-        let known = self.grey.len() == now.grey.len() && gain > 0.0 && error < 5e-3;
-        if !known {
+        if self.grey.len() != now.grey.len() {
             return None;
         }
-        let count = self.grey.len() as f64;
-        let residual = sum(&|then, now| (now - gain * then).powi(2)) / count;
-        let uneven = (residual - noise * noise).max(0.0).sqrt() / (squares / count).sqrt();
-        let of_change = 0.1 * (gain - 1.0);
+        let noise = now.error_grey.hypot(self.error_grey);
+        // Clipped blocks have lost the light that they would be compared by.
+        let both = self.grey.iter().copied().zip(now.grey.iter().copied());
+        let usable = |(then, now): &(f64, f64)| *then > CLIPPED_GREY && *now > CLIPPED_GREY;
+        let blocks: Vec<(f64, f64)> = both.filter(usable).collect();
+        let count = blocks.len() as f64;
+        let sum = |f: &dyn Fn(f64, f64) -> f64| -> f64 {
+            blocks.iter().map(|&(then, now)| f(then, now)).sum()
+        };
+        let squares = sum(&|then, _| then * then);
+        let error = noise / squares.sqrt();
+        if blocks.len() < 3 || error > LARGEST_ERROR {
+            // Blocks that had light and have none now show another black level, or lamps that are
+            // off.
+            let lit = |then: &&f64| **then > 5.0 * noise + CLIPPED_GREY;
+            let lit = self.grey.iter().filter(lit).count();
+            return (2 * lit > self.grey.len()).then_some(LightChange::LOST);
+        }
+        let ratio = sum(&|then, now| then * now) / squares;
+        let uneven = |squares_left: f64| {
+            let left = (squares_left / count - noise * noise).max(0.0);
+            (left * count / squares).sqrt()
+        };
+        let alone = uneven(sum(&|then, now| (now - ratio * then).powi(2)));
+        let [mean, mean_now] = [sum(&|then, _| then) / count, sum(&|_, now| now) / count];
+        let spread = sum(&|then, _| (then - mean).powi(2));
+        // Noise of the blocks adds to their spread and makes the slope flatter.
+        let structure = spread - count * self.error_grey.powi(2);
+        let gain = sum(&|then, now| (then - mean) * now) / structure;
+        let left = sum(&|then, now| (now - mean_now - gain * (then - mean)).powi(2));
+        let is_structured = structure > LEAST_STRUCTURE * (spread - structure) && gain > 0.0;
+        let by_structure = match is_structured {
+            true => (left / (count - 2.0)).max(noise * noise).sqrt() / structure.sqrt() / gain,
+            false => f64::INFINITY,
+        };
+        let seen = (ratio - 1.0).abs() > 0.01 + 5.0 * error
+            || alone > 0.01
+            || is_structured && gain.ln().abs() > 0.01 + 5.0 * by_structure;
+        if !seen {
+            let of_change = 0.1 * (ratio - 1.0);
+            return Some(LightChange {
+                gain: Estimate::new(ratio, error.hypot(alone).hypot(of_change)),
+                stray_grey: 0.0,
+                uneven: alone,
+                seen,
+            });
+        }
+        let half = 0.5 * ratio.ln();
+        let weights = [by_structure, half.hypot(BOTH)].map(|error| error.powi(-2));
+        let total = weights[0] + weights[1];
+        let log_gain = match is_structured {
+            true => (weights[0] * gain.ln() + weights[1] * half) / total,
+            false => half,
+        };
+        let gain = log_gain.exp();
+        let uneven = if is_structured { uneven(left) } else { 0.0 };
         Some(LightChange {
-            gain: Estimate::new(gain, error.hypot(uneven).hypot(of_change)),
+            gain: Estimate::new(gain, gain * total.powf(-0.5).hypot(uneven)),
+            stray_grey: mean_now - gain * mean,
             uneven,
-            seen: (gain - 1.0).abs() > 0.01 + 5.0 * error || uneven > 0.01,
+            seen,
         })
     }
 }
@@ -96,10 +158,31 @@ impl ReferenceLight {
 /// The change of the light since the calibration.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LightChange {
-    /// The factor common to the whole frame.
+    /// The factor of the lamps.
     pub gain: Estimate,
-    /// Deviation from a common factor: relative root mean square over the blocks.
-    pub uneven: f64,
+    /// Light that was added to theirs, in grey levels.
+    stray_grey: f64,
+    /// Deviation from a common change: relative root mean square over the blocks.
+    uneven: f64,
     /// Whether the change deserves a caution.
-    pub seen: bool,
+    seen: bool,
+}
+
+impl LightChange {
+    /// The background of the calibration is gone: forces may be off by half.
+    const LOST: Self = Self {
+        gain: Estimate::new(1.0, 0.5),
+        stray_grey: f64::NAN,
+        uneven: f64::NAN,
+        seen: true,
+    };
+
+    pub(super) fn caution(&self) -> Option<Flag> {
+        self.seen.then_some(Flag::LightChanged {
+            change: self.gain.value - 1.0,
+            change_error: self.gain.standard_error,
+            stray_grey: self.stray_grey,
+            uneven: self.uneven,
+        })
+    }
 }

@@ -306,6 +306,11 @@ impl Session {
             .cautions(frame, self.last.view(), &self.contact, None)
     }
 
+    /// The cautions about all frames: about the calibration, and the change of the light since.
+    pub fn standing_cautions(&self) -> Vec<Flag> {
+        self.stages.standing_cautions().collect()
+    }
+
     /// Rejects a contact that is not that of one flat face, the same as in the first frame.
     fn check_face(
         &self,

@@ -9,6 +9,7 @@ use super::report::{Report, SkipReason, Stage};
 use super::specimen::{Object, Specimen};
 use super::strain::PairStrain;
 use super::surface::{self, ContactSurface, ContactSurfaceWorkspace, ControlPoints};
+use crate::elasticity::contact::Layer;
 use crate::elasticity::field::StrainField;
 use crate::elasticity::modulus::{
     Estimate, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator, Warning,
@@ -219,7 +220,11 @@ impl Stages {
             });
             return caution.into_iter().collect();
         };
-        let ball = self.is_ball();
+        // A body of unknown shape that does not look like a flat face is compared with a ball: a wet
+        // ring or a tacky ball changes its force, too.
+        let unknown = matches!(self.pipeline.settings().object, Object::Unknown { .. });
+        let is_face = reading.face.as_ref().is_some_and(FaceReading::has_edge);
+        let ball = self.is_ball() || unknown && !is_face;
         let own = reading
             .flags(frame)
             .filter(|flag| ball || !matches!(flag, Flag::NotABall { .. } | Flag::NotRound { .. }));
@@ -261,6 +266,14 @@ impl Stages {
         let step = contact.background_step_grey.filter(|&grey| grey != 0.0);
         flags.extend(step.map(|grey| Flag::LightDrifted { grey }));
         flags
+    }
+
+    /// The cautions about all frames: about the calibration, and the change of the light since.
+    pub(super) fn standing_cautions(&self) -> impl Iterator<Item = Flag> {
+        let doubts = self.contact.doubts().iter().filter_map(Flag::of_pairs);
+        // The reading of each frame has the bend.
+        let doubts = doubts.filter(|flag| !matches!(flag, Flag::LightNotProportional { .. }));
+        doubts.chain(self.light.and_then(|light| light.caution()))
     }
 
     /// The contact as a flat face.
@@ -384,21 +397,43 @@ impl Stages {
         let mut estimate = scratch
             .timed(Stage::Modulus, |_| estimator.estimate(loads))
             .map_err(PipelineError::Modulus)?;
-        let slips = self.likely_slips(estimate.youngs_modulus_pa);
+        let radii = loads
+            .loads()
+            .iter()
+            .filter_map(|load| load.contact_radius_m);
+        let radius_m = radii.map(|radius| radius.value).reduce(f64::max);
+        let slips = self.likely_slips(estimate.youngs_modulus_pa, radius_m);
         estimate.warnings.extend(slips);
         Ok(estimate)
     }
 
     /// Warnings about values that are possible but more often come from a wrong unit or name.
-    fn likely_slips(&self, modulus_pa: f64) -> impl Iterator<Item = Warning> {
+    fn likely_slips(
+        &self,
+        modulus_pa: f64,
+        radius_m: Option<f64>,
+    ) -> impl Iterator<Item = Warning> {
         let settings = self.pipeline.settings();
-        let layers = settings.waveguide.iter().flat_map(|guide| guide.layers());
-        let moduli = layers.map(|layer| layer.youngs_modulus_pa);
-        let ratios = moduli.map(|layer_pa| modulus_pa / layer_pa);
-        // The ratio to the layer whose modulus is closest to that of the sample.
-        let ratio = ratios.min_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs()));
-        let unlike = ratio.filter(|ratio| ratio.ln().abs() > Warning::UNLIKE_GUIDE.ln());
-        let unlike = unlike.map(|ratio| Warning::UnlikeGuide { ratio });
+        let layers = settings
+            .waveguide
+            .as_ref()
+            .map_or(&[][..], |guide| guide.layers());
+        let far = |ratio: &f64| ratio.ln().abs() > Warning::UNLIKE_GUIDE.ln();
+        // The modulus of a deep layer as stiff as the guide under the contact. Solving for it is
+        // worth the time only if the sample is not like one of the layers.
+        let unlike_layers = layers.iter().all(|layer| {
+            (modulus_pa / layer.youngs_modulus_pa).ln().abs() > 0.5 * Warning::UNLIKE_GUIDE.ln()
+        });
+        let ratio = radius_m
+            .filter(|_| unlike_layers && !layers.is_empty())
+            .and_then(|radius_m| {
+                let nu = layers[0].poisson_ratio;
+                let guide_pa = Layer::log_stiffness(layers, radius_m)?.exp() * (1.0 - nu * nu);
+                Some(modulus_pa / guide_pa)
+            });
+        let unlike = ratio
+            .filter(far)
+            .map(|ratio| Warning::UnlikeGuide { ratio });
         let poisson_ratio = settings.object.poisson_ratio();
         let negative =
             (poisson_ratio < 0.0).then_some(Warning::NegativePoissonRatio { poisson_ratio });

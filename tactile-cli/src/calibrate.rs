@@ -17,6 +17,7 @@ use tactile_files::sensor::{
 use tactile_imaging::force::{
     Branch, CalibrationPair, LinearCalibration, LocalCalibration, StressCalibration,
 };
+use tactile_imaging::pipeline::Flag;
 
 /// Calibrate a sensor from frames of presses, or fit the line from pixel value to force
 ///
@@ -72,6 +73,7 @@ pub(crate) fn run(arguments: &CalibrateArguments, context: &mut Context) -> Resu
     context.outputs.plan(&[PairLine::PAGE], &[input])?;
     let line = PairLine::read(input, arguments.there_and_back, &arguments.reading, context)?;
     line.print(context);
+    line.warn(context);
     context.value(&line.value());
     context.outputs.page(PairLine::PAGE, || line.page())?;
     Ok(Exit::Complete)
@@ -121,6 +123,13 @@ impl PairLine {
         }
         let line = LinearCalibration::fit(&pairs).map_err(|error| Failure::in_file(path, error))?;
         Ok(Self { pairs, line })
+    }
+
+    /// The doubts about the pairs, in the words of the frames that are measured by them.
+    pub(crate) fn warn(&self, context: &mut Context) {
+        let doubts = self.line.report().doubts.iter();
+        let flags: Vec<Flag> = doubts.filter_map(Flag::of_pairs).collect();
+        context.warn_of_frame(&flags);
     }
 
     pub(crate) fn print(&self, context: &mut Context) {

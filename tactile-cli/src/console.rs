@@ -11,6 +11,7 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
+use tactile_files::scene::Scene;
 use tactile_imaging::core::Progress;
 use tactile_imaging::pipeline::Flag;
 
@@ -121,6 +122,15 @@ impl Context {
             caution.append(&mut numbers);
         }
         self.cautions.push(caution);
+    }
+
+    /// A caution if nothing shows that the lamps are those of the calibration.
+    pub(crate) fn warn_of_light(&mut self, scene: &Scene) {
+        if scene.takes_light_as_unchanged() {
+            let sentence = "forces assume the lamps of the calibration: state its frame without \
+                            contact (reference under [calibration]), or add a [[check]]";
+            self.warn("calibration_light_unknown", Value::Null, sentence);
+        }
     }
 
     /// The cautions about a frame, one per line, below the name of the frame.

@@ -13,8 +13,8 @@ use serde_json::json;
 use std::path::PathBuf;
 use tactile_files::io::Grey;
 use tactile_imaging::Pipeline;
-use tactile_imaging::force::Estimate;
-use tactile_imaging::pipeline::{ContactReading, Object, Session, Update};
+use tactile_imaging::force::{Estimate, ReferenceFrame, Source};
+use tactile_imaging::pipeline::{ContactReading, Object, ReferenceLight, Session, Update};
 
 /// Measure force, contact radius, centroid and stress in frames of a sensor that grows brighter
 /// where it is pressed
@@ -36,6 +36,13 @@ pub(crate) struct ForceArguments {
     /// Calibration pairs: CSV with the columns integrated_pixel_value and force.
     #[arg(long, value_name = "PAIRS.csv")]
     pairs: PathBuf,
+    /// Frame without contact from which the sums of the pairs were taken. With it, forces allow for
+    /// lamps that changed since.
+    #[arg(long, value_name = "IMAGE")]
+    pairs_reference: Option<PathBuf>,
+    /// The sensor has a fixed diffusing skin, so that the light does not depend on the object.
+    #[arg(long)]
+    skin: bool,
     #[command(flatten)]
     reading: TableArguments,
 }
@@ -44,19 +51,37 @@ pub(crate) fn run(arguments: &ForceArguments, context: &mut Context) -> Result<E
     let ForceArguments {
         frames,
         pairs,
+        pairs_reference,
+        skin,
         reading,
     } = arguments;
     let table = "force.csv";
-    context
-        .outputs
-        .plan(&[table, PairLine::PAGE], &frames.files(pairs))?;
+    let mut read = frames.files(pairs);
+    read.extend(pairs_reference.as_deref());
+    context.outputs.plan(&[table, PairLine::PAGE], &read)?;
     let line = PairLine::read(pairs, false, reading, context)?;
     let image = frames.read_reference(Grey::default())?;
     // Forces follow from the light for any object.
     let object = Object::Unknown {
         poisson_ratio: Object::DEFAULT_POISSON_RATIO,
     };
+    let light = pairs_reference.as_deref().map(|path| {
+        let image = frames.read_without_contact(path, Grey::default())?;
+        let frame = ReferenceFrame::new(image.view());
+        Ok::<_, Failure>(ReferenceLight::of(
+            &frame.map_err(|e| Failure::in_file(path, e))?,
+        ))
+    });
+    let light = light.transpose()?;
     let pipeline = Pipeline::from_pairs(&line.pairs, frames.pixel_m(), object);
+    let pipeline = pipeline.and_then(|pipeline| {
+        pipeline.with_settings(|settings| {
+            settings.calibrated_light = light;
+            if *skin {
+                settings.assumptions.state(Source::Coupling, 0.0);
+            }
+        })
+    });
     let mut session = pipeline
         .and_then(|pipeline| Session::new(&pipeline, &[image.view()]))
         .map_err(|error| Failure::in_file(&frames.reference, error))?;
@@ -74,6 +99,7 @@ pub(crate) fn run(arguments: &ForceArguments, context: &mut Context) -> Result<E
             let NamedFrame { name, pixels, .. } = frame.named();
             if let Some(line) = heading.take() {
                 line.print(context);
+                context.warn_of_frame(&session.standing_cautions());
             }
             let found = session.push(pixels.view());
             context.line(format_args!("{name}:"));
@@ -107,6 +133,8 @@ pub(crate) fn run(arguments: &ForceArguments, context: &mut Context) -> Result<E
 #[derive(Serialize)]
 struct Answer {
     force_n: Option<Estimate>,
+    #[serde(skip)]
+    no_force_n: Option<f64>,
     contact_radius_m: Estimate,
     centroid_m: [Estimate; 2],
     mean_stress_pa: Option<Estimate>,
@@ -118,6 +146,7 @@ impl Answer {
         let [x, y] = contact.centroid_px;
         Self {
             force_n: contact.force_n.map(|force| force.total()),
+            no_force_n: contact.no_force_n(),
             contact_radius_m: contact.contact_radius_m.total(),
             centroid_m: [x * pixel_m[0], y * pixel_m[1]],
             mean_stress_pa: contact.mean_stress_pa().map(|stress| stress.total()),
@@ -131,6 +160,10 @@ fn print(answer: Option<&Answer>, context: &mut Context) {
         context.line("no contact");
         return;
     };
+    if let Some(most_n) = answer.no_force_n {
+        context.line(format_args!("no force (< {most_n:.2e} N)"));
+        return;
+    }
     if let Some(force) = answer.force_n {
         context.row("force", in_unit(force, 1.0) + " N");
     }

@@ -108,7 +108,16 @@ impl SensorFrames {
 
     /// The frame without contact, in eight bits.
     pub(crate) fn read_reference(&self, grey: Grey) -> Result<Array2<u8>, Failure> {
-        Ok(read_grey_image(&self.reference, grey, self.bits)?.to_u8())
+        self.read_without_contact(&self.reference, grey)
+    }
+
+    /// Another frame without contact, in eight bits.
+    pub(crate) fn read_without_contact(
+        &self,
+        path: &Path,
+        grey: Grey,
+    ) -> Result<Array2<u8>, Failure> {
+        Ok(read_grey_image(path, grey, self.bits)?.to_u8())
     }
 
     /// The options for reading the pressed frames.

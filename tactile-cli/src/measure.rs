@@ -100,6 +100,7 @@ impl Frames {
         let mut scene = Scene::read(path).map_err(Failure::input)?;
         if !arguments.frames.is_empty() {
             let mut data = scene.load_without_frames().map_err(Failure::input)?;
+            context.warn_of_light(&scene);
             let reading = Reading {
                 grey: Grey::default(),
                 bits: scene.bits,
@@ -125,6 +126,7 @@ impl Frames {
             context.allow(bytes, &job, "give fewer or smaller frames")?;
         }
         let data = scene.load_without_frames().map_err(Failure::input)?;
+        context.warn_of_light(&scene);
         let mut colours = Colours::Unknown;
         for SceneFrame { image, .. } in &scene.frames {
             // Loading the frames reports the error of an unreadable one.
@@ -132,6 +134,22 @@ impl Frames {
             colours.compare(&scene.reference, image, colour, context);
         }
         Ok(Self::Scene(Box::new((scene, data, Exit::Complete))))
+    }
+
+    /// Leaves out the frames that have a reason for it.
+    fn leave_out(&mut self, reasons: &[Option<String>], context: &mut Context) {
+        let Self::Scene(own) = self else { return };
+        let (scene, data, _) = own.as_mut();
+        for (frame, reason) in scene.frames.iter().zip(reasons) {
+            if let Some(reason) = reason {
+                let text = format!("{} is left out: {reason}", frame.image.display());
+                context.warn("frame_left_out", json!({}), text);
+            }
+        }
+        let mut kept = reasons.iter().map(Option::is_none);
+        scene.frames.retain(|_| kept.next() == Some(true));
+        let mut kept = reasons.iter().map(Option::is_none);
+        data.frames.retain(|_| kept.next() == Some(true));
     }
 
     fn pipeline(&self, points: usize) -> Result<Pipeline, Failure> {
@@ -240,13 +258,24 @@ pub(crate) fn run(arguments: &MeasureArguments, context: &mut Context) -> Result
     ];
     let names = stages.map(|name| format!("{name}.svg"));
     context.outputs.plan(&names, arguments.scene.as_slice())?;
-    let frames = Frames::open(arguments, context)?;
+    let mut frames = Frames::open(arguments, context)?;
     let pipeline = frames.pipeline(arguments.points as usize)?;
-    let mut press = frames.press(&pipeline)?;
+    let press = frames.press(&pipeline)?;
     // The contact of a frame is independent of the others: contacts are available even if Ctrl-C
     // stops the rest.
-    let Some(contacts) = contacts(&mut press, context) else {
+    let Some(contacts) = contacts(&press, context) else {
         return Ok(Exit::Interrupted);
+    };
+    // What one frame spoils does not spoil the others.
+    let reasons: Vec<_> = contacts.iter().map(spoilt).collect();
+    let is_spoilt = reasons.iter().flatten().count();
+    let mut press = match is_spoilt > 0 && is_spoilt < reasons.len() {
+        true => {
+            drop(press);
+            frames.leave_out(&reasons, context);
+            frames.press(&pipeline)?
+        }
+        false => press,
     };
     if !long_stages(&press, context) {
         print_contacts(&contacts, context);
@@ -320,8 +349,18 @@ pub(crate) fn run(arguments: &MeasureArguments, context: &mut Context) -> Result
     }
 }
 
+/// Why a frame is left out if others remain.
+fn spoilt(contact: &Contact) -> Option<String> {
+    match contact {
+        Ok(Some(_)) => None,
+        Ok(None) => Some("it shows no contact".to_owned()),
+        Err(PipelineError::Contact { source, .. }) => Some(source.to_string()),
+        Err(_) => None,
+    }
+}
+
 /// The contact of every frame. After Ctrl-C the contacts so far are printed, and the program ends.
-fn contacts(press: &mut Press<'_>, context: &mut Context) -> Option<Vec<Contact>> {
+fn contacts(press: &Press<'_>, context: &mut Context) -> Option<Vec<Contact>> {
     let mut bar = Bar::of(press.frames(), "measuring contacts");
     context.interrupt.polled(true);
     let mut contacts = Vec::with_capacity(press.frames());

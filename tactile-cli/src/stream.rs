@@ -257,8 +257,9 @@ impl Meter for Live {
     }
 
     fn shown(&self, row: &Row, columns: f64) -> Value {
-        let cautions = self.cautions.iter().map(in_words);
-        let cautions: Vec<_> = cautions.collect();
+        // Those that hold now: the table of the series keeps the others.
+        let (standing, now) = (self.session.standing_cautions(), self.session.cautions());
+        let cautions: Vec<_> = standing.iter().chain(&now).map(in_words).collect();
         let of = |e: Estimate| [e.value, e.standard_error];
         json!({
             "cautions": cautions, "force_n": row.force_n.map(of),
@@ -318,6 +319,7 @@ fn finish(
         }
     };
     context.aside(session.report());
+    cautions.extend(session.standing_cautions());
     let drifted = |flag: &Flag| matches!(flag, Flag::LightDrifted { .. });
     if !cautions.iter().any(drifted) {
         cautions.extend(session.drift().caution.clone());
@@ -387,6 +389,7 @@ fn recorded(
     let clock = Bar::clock("reading the scene");
     let data = scene.load_without_frames().map_err(Failure::input)?;
     drop(clock);
+    context.warn_of_light(&scene);
     let pipeline = scene.pipeline(&data).map_err(Failure::input)?;
     let session = Session::new(&pipeline, &[data.reference.view()])
         .map_err(|error| Failure::input(scene.measure_error(error)))?;

@@ -188,6 +188,11 @@ pub(crate) struct DetectorWorkspace {
 /// Components with fewer pixels are noise.
 const MINIMUM_AREA_PX: usize = 4;
 
+/// A contact whose peak is below this number of standard deviations of the noise is faint. It is
+/// judged again by the scatter of the frame, which exceeds the noise of a reference that is a mean
+/// of frames in 8 bits, and contains rows or columns that differ.
+const FAINT: f64 = 20.0;
+
 /// Finds the contact in frames of one sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ContactDetector {
@@ -208,7 +213,7 @@ impl ContactDetector {
     ) -> Result<Detection, ForceError> {
         reference.check(frame)?;
         workspace.region.place = None;
-        let sd = reference.difference_variance().sqrt();
+        let mut sd = reference.difference_variance().sqrt();
         // Half of the false alarms are assigned to single pixels (of either sign), half to tiles.
         let pixel_limit =
             (quantile(0.25 * self.options.false_alarm_rate, frame.len()) * sd).min(255.0);
@@ -220,25 +225,37 @@ impl ContactDetector {
             noise: None,
             contact: None,
         };
-        // Frames without contact end here, after one pass.
-        let Some(suspect) = self.suspect(
-            &workspace.pass,
-            reference,
-            &statistics,
-            &drift,
-            sd,
-            pixel_limit,
-        ) else {
-            return Ok(none);
+        // Sessions allocate nothing after their first frames.
+        workspace.columns.clear();
+        workspace.columns.reserve(workspace.pass.tiles.sums.len());
+        let pass = &workspace.pass;
+        let mut suspect = self.suspect(pass, reference, &statistics, &drift, sd, pixel_limit);
+        let (extent, peak) = loop {
+            // Frames without contact end here, after one pass.
+            let Some(bounds) = suspect else {
+                workspace.region.place = None;
+                return Ok(none);
+            };
+            let region = &mut workspace.region;
+            let Some(extent) = self.segment(region, frame, reference, &drift, bounds, sd) else {
+                workspace.region.place = None;
+                return Ok(none);
+            };
+            let peak = peak(region);
+            let seen = match f64::from(peak) < FAINT * sd {
+                true => {
+                    let sizes = &mut workspace.columns;
+                    scatter(reference, &workspace.pass.tiles, &drift, sizes)
+                }
+                false => 0.0,
+            };
+            if seen <= sd {
+                break (extent, peak);
+            }
+            sd = seen;
+            suspect = self.bright_tiles(&workspace.pass.tiles, reference, frame.dim(), &drift, sd);
         };
-        let Some(extent) =
-            self.segment(&mut workspace.region, frame, reference, &drift, suspect, sd)
-        else {
-            workspace.region.place = None;
-            return Ok(none);
-        };
-        let peak = peak(&workspace.region);
-        let noise = self.noise(workspace, reference, &drift, peak);
+        let noise = self.noise(workspace, reference, &drift, peak, sd);
         let saturated = if self.options.polarity.sign() > 0 && statistics.saturated == 0 {
             0
         } else {
@@ -318,6 +335,7 @@ impl ContactDetector {
         reference: &ReferenceFrame,
         drift: &IlluminationDrift,
         peak: f32,
+        sd: f64,
     ) -> DifferenceNoise {
         let DetectorWorkspace { region, noise, .. } = workspace;
         let (x, y) = region
@@ -328,7 +346,7 @@ impl ContactDetector {
             .flat_field()
             .map_or((1.0, 0.0), |f| (f.at(x, y), f.variance_at(x, y)));
         let flat_field = uncertain / (light * light);
-        let background = reference.difference_variance() / (light * light);
+        let background = sd * sd / (light * light);
         let [common, scale] = drift.variances(x, y);
         DifferenceNoise {
             background,
@@ -473,6 +491,34 @@ impl ContactDetector {
             .map(|k| tiles.pixels(k, size))
             .reduce(BoundingBox::union)
     }
+}
+
+/// Standard deviation of the noise per pixel from the sums of the tiles, if it exceeds that by
+/// chance. Zero if the tiles are too few. A contact on up to two thirds of the tiles does not reach
+/// the third that determines it.
+fn scatter(
+    reference: &ReferenceFrame,
+    tiles: &Tiles,
+    drift: &IlluminationDrift,
+    sizes: &mut Vec<f64>,
+) -> f64 {
+    // Half of a normal variable's absolute values are below 0.6745 standard deviations, a third
+    // below 0.4307.
+    const THIRD: f64 = 0.4307;
+    // Fewer tiles determine the third to a quarter of itself, with four standard errors to itself.
+    const FEWEST: usize = 32;
+    let Some(sums) = reference.tile_sums(tiles) else {
+        return 0.0;
+    };
+    sizes.clear();
+    sizes.extend(sums.map(|tile| drift.residual(&tile).abs() / tile.pixels.sqrt()));
+    if sizes.len() < FEWEST {
+        return 0.0;
+    }
+    let (third, count) = (sizes.len() / 3, sizes.len() as f64);
+    let (_, size, _) = sizes.select_nth_unstable_by(third, f64::total_cmp);
+    let by_chance = 1.0 + 4.0 * 1.3 / count.sqrt();
+    *size / THIRD / by_chance
 }
 
 /// The z with P(N > z) = rate / trials for a standard normal N: among `trials` values, the

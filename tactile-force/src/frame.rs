@@ -258,6 +258,8 @@ impl ReferenceFrame {
         }
         let mut counts = [0_usize; 511];
         let mut total = 0;
+        // Steps between the means of the rows show noise that the pixels of a row share.
+        let (mut previous, mut steps, mut squares) = (None, 0.0, 0.0);
         let (rows, columns) = frame.dim();
         for row in (0..rows).step_by(rows / 24 + 1) {
             let is_beside = (contact.row_start..contact.row_end).contains(&row);
@@ -266,14 +268,24 @@ impl ReferenceFrame {
             } else {
                 [0..columns, 0..0]
             };
+            let (mut sum, mut length) = (0_i64, 0);
             for span in spans {
-                total += span.len();
+                length += span.len();
                 let [frame, reference] = [frame, reference].map(|image| {
                     let row = image.index_axis_move(Axis(0), row);
                     row.slice_axis_move(Axis(0), Slice::from(span.clone()))
                 });
                 for (&f, &r) in frame.iter().zip(reference) {
                     counts[usize::from(255 + u16::from(f) - u16::from(r))] += 1;
+                    sum += i64::from(f) - i64::from(r);
+                }
+            }
+            total += length;
+            if length > 0 {
+                let mean = sum as f64 / length as f64;
+                if let Some(before) = previous.replace(mean) {
+                    steps += 1.0;
+                    squares += (mean - before).powi(2);
                 }
             }
         }
@@ -295,8 +307,10 @@ impl ReferenceFrame {
         // The quartiles of a normal variable are 1.349 standard deviations apart, and the median of
         // many values has 1.253 times the error of their mean.
         let sd = (quantile(0.75) - quantile(0.25)) / 1.349;
-        let error = 1.253 * sd / (total as f64).sqrt();
-        Some(Estimate::new(quantile(0.5), error))
+        let of_pixels = 1.253 * sd / (total as f64).sqrt();
+        // A step has twice the variance of a row.
+        let of_rows = (0.5 * squares / f64::max(steps, 1.0) / (steps + 1.0)).sqrt();
+        Some(Estimate::new(quantile(0.5), of_pixels.max(of_rows)))
     }
 
     /// Compares a frame with the reference, exactly and in one pass over both. The frame must have

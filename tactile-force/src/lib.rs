@@ -53,7 +53,7 @@ mod tiles;
 
 pub use calibration::{
     Branch, CalibrationFrame, CalibrationPair, CurveHysteresis, ForceReading, GreyHistogram,
-    Hysteresis, LineReport, LinearCalibration, LocalCalibration, PressureCurve,
+    Hysteresis, LineReport, LinearCalibration, LocalCalibration, PairsDoubt, PressureCurve,
     PressureCurveOptions, PressureCurveReport, StressCalibration,
 };
 pub use contact::{Contact, ContactOptions};

@@ -13,7 +13,7 @@
 use super::{KnownBall, is_known, is_positive};
 use crate::core::{Estimate, Source};
 use crate::elasticity::contact::{Bond, Layer, Waveguide};
-use crate::elasticity::laws::{ContactLaw, ContactLength, WaveguideLaw};
+use crate::elasticity::laws::{ContactLaw, ContactLength, LogForce, RigidBallLaw, WaveguideLaw};
 use crate::elasticity::modulus::Bodies;
 use crate::pipeline::assumptions::CheckedGuide;
 use crate::pipeline::contact::ContactReading;
@@ -76,15 +76,6 @@ impl GuideCheck {
         self.ball.log_force(layers, self.radius_m.value)
     }
 
-    /// Relative error of F because of the law itself.
-    fn law_error(&self, layers: &[Layer]) -> Option<f64> {
-        let a = self.radius_m.value;
-        match self.ball.youngs_modulus_pa {
-            Some(_) => Some(self.log_force(layers)?.law_error),
-            None => Some(Layer::PARABOLA_ERROR * (a / self.ball.radius_m.value).powi(2)),
-        }
-    }
-
     /// Errors of ln F that presses of this ball share.
     fn ball_errors(&self, layers: &[Layer], here: &PressForce) -> Option<[f64; 3]> {
         let beside = |ball: KnownBall| {
@@ -125,15 +116,16 @@ impl KnownBall {
     /// ln F of a contact of radius a (m), with its derivatives in ln a and ln R.
     fn log_force(&self, layers: &[Layer], a: f64) -> Option<PressForce> {
         let Some(modulus) = self.youngs_modulus_pa else {
-            let stiffness = |a: f64| Layer::log_stiffness(layers, a);
-            let here = stiffness(a)?;
-            let slope = (stiffness(a * STEP.exp())? - here) / STEP;
-            let hertz = (4.0 / 3.0_f64).ln() + 3.0 * a.ln() - self.radius_m.value.ln();
+            let guide = Waveguide::new(layers.to_vec()).ok()?;
+            let law = RigidBallLaw::new(&guide, [a; 2]).ok()?;
+            let (radius_m, step) = (self.radius_m.value, STEP.exp());
+            let here = law.log_force(radius_m, a);
+            let slope = |there: LogForce| (there.value() - here.value()) / STEP;
             return Some(PressForce {
-                value: hertz + here,
-                slope: 3.0 + slope,
-                size_slope: -1.0,
-                law_error: 0.0,
+                value: here.value(),
+                slope: slope(law.log_force(radius_m, a * step)),
+                size_slope: slope(law.log_force(radius_m * step, a)),
+                law_error: here.error(),
             });
         };
         let compliance = |modulus: f64, poisson: f64| (1.0 - poisson * poisson) / modulus;
@@ -179,8 +171,6 @@ fn noise(
     length_scale: f64,
 ) -> Option<DMatrix<f64>> {
     let mut noise = DMatrix::zeros(checks.len(), checks.len());
-    let laws = checks.iter().map(|check| check.law_error(layers));
-    let laws: Vec<f64> = laws.collect::<Option<_>>()?;
     let balls = checks.iter().zip(forces);
     let balls = balls.map(|(check, force)| check.ball_errors(layers, force));
     let balls: Vec<[f64; 3]> = balls.collect::<Option<_>>()?;
@@ -189,7 +179,7 @@ fn noise(
         for (j, second) in checks.iter().enumerate() {
             // Shared errors: pixel size, law and weights.
             noise[(i, j)] = forces[i].slope * forces[j].slope * length_scale * length_scale
-                + laws[i] * laws[j]
+                + forces[i].law_error * forces[j].law_error
                 + force * second.known_n.relative_error();
             if first.ball == second.ball {
                 let products = balls[i].iter().zip(&balls[j]).map(|(a, b)| a * b);

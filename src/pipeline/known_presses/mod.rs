@@ -242,7 +242,6 @@ fn trusted(contact: &ContactReading) -> Result<(), &'static str> {
             contact.touches_edge,
             "its contact is cut by the frame's edge",
         ),
-        (contact.saturated_share > 0.0, "its contact is saturated"),
         (contact.other_contacts > 0, "it shows several contacts"),
     ];
     match doubts.iter().find(|(doubted, _)| *doubted) {

@@ -16,10 +16,6 @@ impl Layer {
     /// Number of parameters of a layer with errors: ln E, ln h and ν.
     pub const PARAMETERS: usize = 3;
 
-    /// Relative error of F = 4/3 E_g a³/R at a/R = 1, because a rigid ball is approximated by a
-    /// parabola and strains are assumed small. It is proportional to (a/R)².
-    pub const PARABOLA_ERROR: f64 = 0.1;
-
     /// ln of the stiffness E_g of the guide under a ball's contact of radius a, F = 4/3 E_g a³/R.
     /// `None` if the layer equation cannot be solved.
     ///

@@ -8,6 +8,7 @@
 //! | [`ConeLaw`] | cone on a half-space |
 //! | [`LayerLaw`] | ball on one layer, which is the sample |
 //! | [`WaveguideLaw`] | soft ball, the sample, on the layers of a guide at finite strain |
+//! | [`RigidBallLaw`] | rigid balls on the layers of a guide, which they calibrate |
 //!
 //! [`ContactEstimator`](crate::modulus::ContactEstimator) turns a law into a modulus with its error.
 
@@ -16,12 +17,14 @@ mod finite_strain;
 mod hertz;
 mod layer;
 mod punch;
+mod rigid_ball;
 mod waveguide;
 
 pub use cone::ConeLaw;
 pub use hertz::HertzLaw;
 pub use layer::LayerLaw;
 pub use punch::PunchLaw;
+pub use rigid_ball::RigidBallLaw;
 pub use waveguide::WaveguideLaw;
 
 use std::ops::Deref;

@@ -68,10 +68,10 @@ pub enum Warning {
         /// a/R.
         ratio: f64,
     },
-    /// The modulus is far from that of every layer of the guide. It is then poorly determined, or
-    /// an input has a wrong unit.
+    /// The modulus is far from that of the guide under the contact. It is then poorly determined,
+    /// or an input has a wrong unit.
     UnlikeGuide {
-        /// Ratio of the modulus to that of the closest layer.
+        /// Ratio of the modulus to that of a deep layer as stiff as the guide.
         ratio: f64,
     },
     /// A contact is outside the range of the law and was skipped.

@@ -1,6 +1,6 @@
 //! Reads the files of a scene, checks them against each other, and builds the pipeline.
 use super::file::guide;
-use super::{CalibrationSource, Scene, read_contact_table};
+use super::{CalibrationSource, Scene, SceneCheck, read_contact_table};
 use crate::io::{FileError, FilePlace, InputQuantity, read_columns, read_frame, read_grey_levels};
 use crate::sensor::Sensor;
 use ndarray::{Array2, ArrayView2};
@@ -10,11 +10,11 @@ use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::contact::ContactTable;
 use tactile_imaging::elasticity::modulus::TabulatedContact;
 use tactile_imaging::force::{
-    CalibrationPair, ContactOptions, DriftCorrection, Estimate, ForceOptions,
+    CalibrationPair, ContactOptions, DriftCorrection, Estimate, ForceOptions, ReferenceFrame,
 };
 use tactile_imaging::pipeline::{
-    CheckPress, DarkContact, EstimatorChoice, LightContact, Measurement, Object, Pipeline,
-    PipelineError, Press, SurfaceInput,
+    CheckPress, CheckedObject, DarkContact, EstimatorChoice, LightContact, Measurement, Object,
+    Pipeline, PipelineError, Press, ReferenceLight, SurfaceInput,
 };
 
 /// The calibration of a scene, read from its files.
@@ -71,6 +71,8 @@ pub struct SceneData {
     pub frames: Vec<Array2<u8>>,
     /// The calibration.
     pub calibration: LoadedCalibration,
+    /// The light of the calibration's own frame without contact, if the scene names one.
+    pub calibrated_light: Option<ReferenceLight>,
     /// The contact table, if the scene names one.
     pub contact_table: Option<ContactTable>,
     /// The images of the presses of known force, in the order of the scene.
@@ -122,6 +124,13 @@ impl Scene {
                 LoadedCalibration::DepthTable(rows)
             }
         };
+        let light = self.calibration_reference.as_ref().map(|path| {
+            let (field, size) = ("calibration.reference", Some(reference.dim()));
+            let image = read_frame(&self.file, field, path, self.bits, size)?;
+            let frame = ReferenceFrame::new(image.view()).map_err(|e| in_field(field, e.into()))?;
+            Ok::<_, FileError>(ReferenceLight::of(&frame))
+        });
+        let calibrated_light = light.transpose()?;
         let checks = self.checks.iter().enumerate().map(|(k, check)| {
             let field = format!("check[{}].image", k + 1);
             let size = Some(reference.dim());
@@ -134,6 +143,7 @@ impl Scene {
             reference,
             frames: Vec::new(),
             calibration,
+            calibrated_light,
             contact_table: contact_table.transpose()?,
             checks,
         })
@@ -208,8 +218,10 @@ impl Scene {
     /// let frame = ndarray::Array2::from_elem((20, 30), 10);
     /// let calibration = LoadedCalibration::Pairs(pairs);
     /// let frames = vec![frame.clone()];
-    /// let (contact_table, checks) = (None, vec![]);
-    /// let data = SceneData { reference: frame, frames, calibration, contact_table, checks };
+    /// let (calibrated_light, contact_table, checks) = (None, None, vec![]);
+    /// let reference = frame;
+    /// let data =
+    ///     SceneData { reference, frames, calibration, calibrated_light, contact_table, checks };
     /// // The strain measure comes from the file, the number of points from the program.
     /// let pipeline = scene.pipeline(&data)?.with_control_points(60);
     /// let mut press = scene.press(&pipeline, &data)?;
@@ -319,6 +331,7 @@ impl Scene {
         };
         let pipeline = pipeline.with_settings(|settings| {
             settings.flat_field = self.flat_field;
+            settings.calibrated_light.clone_from(&data.calibrated_light);
         })?;
         let guide = guide(&self.layers).map_err(PipelineError::Material)?;
         // An estimator named in the file takes precedence over the one of the contact table.
@@ -347,6 +360,15 @@ impl Scene {
             }
             settings.state_errors(&self.errors);
         })
+    }
+
+    /// Whether nothing shows that the lamps are those of the calibration: neither its reference, nor
+    /// a press of known force.
+    #[must_use]
+    pub fn takes_light_as_unchanged(&self) -> bool {
+        let by_pairs = matches!(self.calibration, CalibrationSource::Pairs(_));
+        let of_light = |check: &SceneCheck| !matches!(check.object, CheckedObject::Ball(_));
+        by_pairs && self.calibration_reference.is_none() && !self.checks.iter().any(of_light)
     }
 
     /// The error of a pipeline, with the field of the scene that caused it. Both count from 1.

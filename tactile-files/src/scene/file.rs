@@ -343,6 +343,8 @@ pub struct Scene {
     pub errors: Assumptions,
     /// The conversion from grey levels to force or depth.
     pub calibration: CalibrationSource,
+    /// The frame without contact from which the sums of the calibration's pairs were taken.
+    pub calibration_reference: Option<PathBuf>,
     /// The frames, in the order of the file.
     pub frames: Vec<SceneFrame>,
     /// Presses of known force, before or after the frames.
@@ -451,6 +453,8 @@ fn bits<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u8>, D::Err
 #[serde(deny_unknown_fields)]
 struct CalibrationTable {
     pairs: Option<PathBuf>,
+    /// The frame without contact from which the sums of the pairs were taken.
+    reference: Option<PathBuf>,
     depth_table: Option<PathBuf>,
 }
 
@@ -633,6 +637,10 @@ impl SceneFile {
                 .is_none_or(|d| d == Drift::Automatic),
             errors,
             calibration,
+            calibration_reference: self
+                .calibration
+                .and_then(|table| table.reference)
+                .map(|path| beside(file, &path)),
             frames,
             checks,
             object,
@@ -670,6 +678,10 @@ impl SceneFile {
             )),
             Some(table) => match (&table.pairs, &table.depth_table) {
                 (Some(pairs), None) => Ok(CalibrationSource::Pairs(beside(file, pairs))),
+                (None, Some(_)) if table.reference.is_some() => Err(error(
+                    "calibration.reference",
+                    "expected none: a depth table does not depend on the lamps",
+                )),
                 (None, Some(depths)) => Ok(CalibrationSource::DepthTable(beside(file, depths))),
                 (None, None) => Err(error("calibration", "expected `pairs` or `depth_table`")),
                 (Some(_), Some(_)) => Err(error(

@@ -6,6 +6,8 @@
 //!
 //! [calibration]                          # one of the two, none where every frame has its force_N
 //! pairs = "calibration.csv"              # columns integrated_pixel_value,force_N
+//! reference = "reference.png"            # the sensor without contact when the pairs were taken:
+//!                                        # with it, forces allow for lamps that changed since
 //! # depth_table = "depth.csv"            # columns darkness_grey_levels,depth_mm
 //!
 //! [[frames]]

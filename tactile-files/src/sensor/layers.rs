@@ -1,14 +1,15 @@
 //! Fits the layers of the guide to contact radii of rigid balls.
 //!
-//! ln F = ln(4/3 a³/R) + ln E_g(a, layers), with E_g from the layer equation. The parameters are ln
-//! E, ln h and ν of all layers, ln R of every ball, and one factor on all forces, because the
-//! parabola of the theory is not a ball. All start from their stated values, with the stated errors
-//! as a prior. Parameters that the presses do not determine keep their stated values.
+//! ln F(a, R, layers) is that of [`RigidBallLaw`], the law by which a scene's frames are measured.
+//! The parameters are ln E, ln h and ν of all layers, ln R of every ball, and the error of the law,
+//! which all presses share. All start from their stated values, with the stated errors as a prior.
+//! Parameters that the presses do not determine keep their stated values.
 use super::findings::{LayerFinding, PressFinding, SensorError};
 use super::input::{Indenter, LayerInput};
 use crate::scene::{SceneLayer, elastic_layers};
 use nalgebra::{DMatrix, DVector};
-use tactile_imaging::elasticity::contact::Layer;
+use tactile_imaging::elasticity::contact::{Layer, Waveguide};
+use tactile_imaging::elasticity::laws::RigidBallLaw;
 use tactile_imaging::force::Estimate;
 
 /// A contact of a rigid ball.
@@ -49,9 +50,10 @@ impl LayerFit {
     }
 }
 
-/// Number of nodes in ln a for the polynomial of ln E_g. Five leave an error of 10⁻⁵ over a decade,
-/// and each costs a solution of the layer equation.
-const NODES: usize = 5;
+/// Part of the law's error that contacts of other a/R do not share: it bends over a/R.
+const OWN_PART_OF_LAW: f64 = 0.5;
+/// Largest a/R of a press that is used: up to here the law was compared with finite elements.
+const LARGEST_CONTACT_RATIO: f64 = 0.85;
 /// Largest deviation of a stated value, or of the whole fit, in standard errors.
 const LARGEST_DEVIATION: f64 = 4.0;
 /// Standard error of a parameter that is stated as exact, far below what presses can determine.
@@ -88,8 +90,7 @@ pub(super) fn fit(
         else {
             continue;
         };
-        // Beyond half its radius a ball differs too much from a parabola.
-        if radius.value > 0.5 * radius_m || press.force_n <= 0.0 {
+        if radius.value > LARGEST_CONTACT_RATIO * radius_m || press.force_n <= 0.0 {
             continue;
         }
         // Presses of equal radius use the same ball and share its error.
@@ -106,7 +107,11 @@ pub(super) fn fit(
             force_n: press.force_n,
             force_error: (gauge_noise_n / press.force_n).max(1e-4),
             radius_m: radius.value,
-            radius_error: (radius.standard_error / radius.value).hypot(PROFILE_ERROR),
+            // The curve that converts light to pressure, and with it the profile, is as uncertain
+            // at the grey levels of this press as its force.
+            radius_error: (radius.standard_error / radius.value)
+                .hypot(gauge_noise_n / press.force_n)
+                .hypot(PROFILE_ERROR),
         });
         places.push(place);
     }
@@ -115,21 +120,16 @@ pub(super) fn fit(
         return Ok(as_stated);
     }
     let layers = elastic_layers(&as_stated.layers);
-    let problem = Problem::new(&errors, &balls, &contacts);
-    let Some(solution) = problem.solve(&layers) else {
+    let problem = Problem::new(&errors, &balls, &contacts, &layers);
+    let Some((problem, solution)) = problem.and_then(|p| p.solve(&layers).map(|s| (p, s))) else {
         return Ok(as_stated);
     };
     problem.plausible(&solution)?;
     let count = Layer::PARAMETERS * n;
     let parameters = solution.parameters.rows(0, count).into_owned();
     let fitted = Layer::stepped(&layers, &parameters);
-    let Some(stiffness) = Stiffness::new(&fitted, &contacts) else {
-        return Ok(as_stated);
-    };
-    for (place, c) in places.into_iter().zip(&contacts) {
-        let ball_radius = balls[c.ball].radius_m * solution.parameters[count + c.ball].exp();
-        let force_n = 4.0 / 3.0 * c.radius_m.powi(3) / ball_radius * stiffness.at(c.radius_m).exp();
-        presses[place].layers_force_n = Some(force_n);
+    for (place, log_force) in places.into_iter().zip(&solution.log_forces) {
+        presses[place].layers_force_n = Some(log_force.exp());
     }
     let covariance = solution.covariance.view((0, 0), (count, count));
     let layer = |(layer, input): (&Layer, &LayerInput)| SceneLayer {
@@ -186,42 +186,14 @@ fn parameter_errors(input: &LayerInput) -> [f64; 3] {
     ]
 }
 
-/// ln E_g as a function of ln a: a polynomial through Chebyshev nodes.
-struct Stiffness {
-    nodes: [f64; NODES],
-    values: [f64; NODES],
-}
-
-impl Stiffness {
-    fn new(layers: &[Layer], contacts: &[BallContact]) -> Option<Self> {
-        let logs: DVector<f64> =
-            DVector::from_iterator(contacts.len(), contacts.iter().map(|c| c.radius_m.ln()));
-        let (low, high) = (logs.min(), logs.max());
-        // A single radius gets a minimum span, so that no nodes coincide.
-        let half = (0.5 * (high - low)).max(0.05);
-        // Chebyshev nodes keep the interpolation from oscillating at the ends.
-        let nodes = std::array::from_fn(|k| {
-            let angle = std::f64::consts::PI * (k as f64 + 0.5) / NODES as f64;
-            0.5 * (low + high) - half * angle.cos()
-        });
-        let mut values = [0.0; NODES];
-        for (value, node) in values.iter_mut().zip(nodes) {
-            *value = Layer::log_stiffness(layers, f64::exp(node))?;
-        }
-        Some(Self { nodes, values })
-    }
-
-    /// Lagrange interpolation at a radius.
-    fn at(&self, radius_m: f64) -> f64 {
-        let x = radius_m.ln();
-        let weight = |k: usize| {
-            let others = (0..NODES).filter(|j| *j != k);
-            others
-                .map(|j| (x - self.nodes[j]) / (self.nodes[k] - self.nodes[j]))
-                .product::<f64>()
-        };
-        (0..NODES).map(|k| self.values[k] * weight(k)).sum()
-    }
+/// The law for all contacts. `None` if the layer equation cannot be solved.
+fn law(layers: &[Layer], contacts: &[BallContact]) -> Option<RigidBallLaw> {
+    let radii = || contacts.iter().map(|c| c.radius_m);
+    let range = [
+        radii().fold(f64::INFINITY, f64::min),
+        radii().fold(0.0, f64::max),
+    ];
+    RigidBallLaw::new(&Waveguide::new(layers.to_vec()).ok()?, range).ok()
 }
 
 struct Problem<'a> {
@@ -231,66 +203,71 @@ struct Problem<'a> {
     /// factor.
     prior: DVector<f64>,
     layer_parameters: usize,
-    /// Weight of the common factor in every contact.
-    model: Vec<f64>,
+    /// Standard error of every contact because of the law.
+    law: Vec<f64>,
 }
 
 struct Solution {
     parameters: DVector<f64>,
     covariance: DMatrix<f64>,
+    /// ln F of every contact by the fitted parameters.
+    log_forces: Vec<f64>,
     /// Sum of squared residuals over the standard errors of the presses alone.
     chi_squared: f64,
 }
 
 impl<'a> Problem<'a> {
-    fn new(errors: &[[f64; 3]], balls: &'a [Ball], contacts: &'a [BallContact]) -> Self {
+    /// `None` if the contacts on the stated layers cannot be solved.
+    fn new(
+        errors: &[[f64; 3]],
+        balls: &'a [Ball],
+        contacts: &'a [BallContact],
+        layers: &[Layer],
+    ) -> Option<Self> {
         let n = errors.len();
         let layer_parameters = Layer::PARAMETERS * n;
         let prior = DVector::from_fn(layer_parameters + balls.len() + 1, |k, _| {
             let error = if k < layer_parameters {
                 errors[k % n][k / n]
             } else {
+                // The last parameter counts standard errors of the law.
                 balls
                     .get(k - layer_parameters)
-                    .map_or(Layer::PARABOLA_ERROR, |b| b.radius_error)
+                    .map_or(1.0, |b| b.radius_error)
             };
             error.max(EXACT)
         });
-        let ratio = |c: &BallContact| c.radius_m / balls[c.ball].radius_m;
-        Self {
+        let law = law(layers, contacts)?;
+        let error = |c: &BallContact| law.log_force(balls[c.ball].radius_m, c.radius_m).error();
+        Some(Self {
             balls,
             contacts,
             prior,
             layer_parameters,
-            model: contacts.iter().map(|c| ratio(c).powi(2)).collect(),
-        }
+            law: contacts.iter().map(error).collect(),
+        })
     }
 
     /// ln F of every contact, as predicted by the law.
     fn predicted(&self, layers: &[Layer], parameters: &DVector<f64>) -> Option<Vec<f64>> {
         let n = self.layer_parameters;
         let step = parameters.rows(0, n).into_owned();
-        let stiffness = Stiffness::new(&Layer::stepped(layers, &step), self.contacts)?;
+        let law = law(&Layer::stepped(layers, &step), self.contacts)?;
         let common = parameters[n + self.balls.len()];
-        let log_force = |(c, model): (&BallContact, &f64)| {
-            let ball_radius = self.balls[c.ball].radius_m.ln() + parameters[n + c.ball];
-            (4.0_f64 / 3.0).ln() + 3.0 * c.radius_m.ln() - ball_radius
-                + stiffness.at(c.radius_m)
-                + model * common
+        let log_force = |(c, error): (&BallContact, &f64)| {
+            let ball_radius_m = self.balls[c.ball].radius_m * parameters[n + c.ball].exp();
+            law.log_force(ball_radius_m, c.radius_m).value() + error * common
         };
-        Some(
-            self.contacts
-                .iter()
-                .zip(&self.model)
-                .map(log_force)
-                .collect(),
-        )
+        Some(self.contacts.iter().zip(&self.law).map(log_force).collect())
     }
 
-    fn variance(&self, contact: &BallContact) -> f64 {
+    /// Of ln F of a contact, beside what all contacts share.
+    fn variance(&self, contact: usize) -> f64 {
+        let c = &self.contacts[contact];
         // F grows as the third power of the radius, and a little faster on layers of finite
         // thickness.
-        contact.force_error.powi(2) + (3.2 * contact.radius_error).powi(2)
+        let measured = c.force_error.hypot(3.2 * c.radius_error);
+        measured.hypot(OWN_PART_OF_LAW * self.law[contact]).powi(2)
     }
 
     /// Gauss–Newton steps on residuals and priors.
@@ -309,7 +286,7 @@ impl<'a> Problem<'a> {
             let mut normal = DMatrix::from_diagonal(&self.prior.map(|sd| (sd * sd).recip()));
             let mut right = -(&normal * &parameters);
             for (i, contact) in self.contacts.iter().enumerate() {
-                let weight = self.variance(contact).recip();
+                let weight = self.variance(i).recip();
                 let row = slopes.row(i).transpose();
                 right += &row * (weight * (contact.force_n.ln() - here[i]));
                 normal += &row * row.transpose() * weight;
@@ -318,11 +295,12 @@ impl<'a> Problem<'a> {
             parameters += &covariance * right;
         }
         let here = self.predicted(layers, &parameters)?;
-        let chi = |(c, log_force): (&BallContact, &f64)| {
-            (c.force_n.ln() - log_force).powi(2) / self.variance(c)
+        let chi = |(i, log_force): (usize, &f64)| {
+            (self.contacts[i].force_n.ln() - log_force).powi(2) / self.variance(i)
         };
         Some(Solution {
-            chi_squared: self.contacts.iter().zip(&here).map(chi).sum(),
+            chi_squared: here.iter().enumerate().map(chi).sum(),
+            log_forces: here,
             parameters,
             covariance,
         })

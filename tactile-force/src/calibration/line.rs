@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 use tactile_core::Estimate;
 
-use super::{Branch, CalibrationPair, StressCalibration};
+use super::{Branch, CalibrationPair, PairsDoubt, StressCalibration};
 use crate::error::{ForceError, check_observations};
 
 /// A straight line from integrated pixel value to force, F = b + s V, or F = s V through the
@@ -106,6 +106,10 @@ impl LinearCalibration {
         };
         let curve = |v: f64| level_n.value + slope_n.value * (v - centre);
         let mut report = LineReport::new(pairs, curve, columns);
+        report.doubts = match parameters[..] {
+            [offset_n, _] => PairsDoubt::of(pairs, offset_n, report.full_scale_n),
+            _ => Vec::new(),
+        };
         report.parameters = parameters;
         report.smallest_force_n = 3.0 * fit.residual_sd;
         Ok(Self {
@@ -164,7 +168,12 @@ impl StressCalibration for LinearCalibration {
         // A force of unknown branch deviates from the line by half of the difference between the
         // branches.
         let branch = self.report.hysteresis.map_or(0.0, |h| h.width_n);
-        level * level + slope * a * (slope * b) + self.covariance * (a + b) + branch * branch
+        let offset = self.report.doubts.iter().find_map(|doubt| match doubt {
+            PairsDoubt::Offset { offset_n } => Some(offset_n.value),
+            _ => None,
+        });
+        let all = branch * branch + offset.map_or(0.0, |offset| offset * offset);
+        level * level + slope * a * (slope * b) + self.covariance * (a + b) + all
     }
 
     fn range(&self) -> [f64; 2] {
@@ -260,6 +269,8 @@ pub struct LineReport {
     pub full_scale_n: f64,
     /// Whether the curve increases between the pixel values of the pairs.
     pub monotone: bool,
+    /// Reasons to doubt the pairs of a line with an offset.
+    pub doubts: Vec<PairsDoubt>,
 }
 
 impl LineReport {
@@ -292,6 +303,7 @@ impl LineReport {
             smallest_force_n: 3.0 * residual_sd_n,
             full_scale_n,
             monotone: sensitivity_n > 0.0 && fitted.is_sorted(),
+            doubts: Vec::new(),
             residuals_n,
         }
     }

@@ -13,11 +13,13 @@
 //! ([`PressureCurve`]) from grey level to pressure is valid for any contact.
 
 mod curve;
+mod doubts;
 mod line;
 
 pub use curve::{
     CalibrationFrame, CurveHysteresis, PressureCurve, PressureCurveOptions, PressureCurveReport,
 };
+pub use doubts::PairsDoubt;
 pub use line::{Hysteresis, LineReport, LinearCalibration};
 
 use ndarray::Array2;

@@ -108,3 +108,31 @@ fn stray_light_is_taken_off_or_held_by_the_error() {
         }
     }
 }
+
+/// The mean of several frames in 8 bits has less noise than a frame: an untouched sensor must not
+/// show a contact. Nor must rows that differ by more than their pixels.
+#[test]
+fn an_untouched_sensor_shows_no_contact_beside_a_smooth_reference() {
+    use rand::{SeedableRng, rngs::ChaCha8Rng};
+    use rand_distr::{Distribution, StandardNormal};
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let smooth = ndarray::Array2::from_elem((240, 320), 30_u8);
+    for row_noise in [0.0, 0.3] {
+        for _ in 0..20 {
+            let mut frame = ndarray::Array2::zeros((240, 320));
+            for mut row in frame.rows_mut() {
+                let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+                let level = 30.0 + row_noise * normal();
+                row.mapv_inplace(|_: u8| (level + 0.5 * normal()).round() as u8);
+            }
+            let pairs =
+                [0.0, 1.0, 2.0].map(|n| tactile_force::CalibrationPair::loading(1e5 * n, n));
+            let line = tactile_force::LinearCalibration::fit(&pairs).unwrap();
+            let (frame, options) = (frame.view(), Default::default());
+            let found =
+                tactile_force::measure_force(frame, smooth.view(), [50e-6; 2], &line, &options);
+            let found = found.unwrap();
+            assert!(found.contact.is_none(), "{row_noise}: {:?}", found.contact);
+        }
+    }
+}

@@ -1,6 +1,6 @@
 //! Simulated sensors with every effect that a calibration must determine, and presses on them.
 //!
-//! Contacts are those of the linear theory of bonded layers for each radius, with Hertz's pressure.
+//! Contacts are those of the laws that calibration and estimator use, with Hertz's pressure.
 //! The closed form of the simulator uses layers in series.
 use ndarray::Array2;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -8,7 +8,8 @@ use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::PI;
 use tactile_files::scene::SceneLayer;
 use tactile_files::sensor::{Indenter, LayerInput, SensorCalibration, SensorPress};
-use tactile_imaging::elasticity::contact::{Bond, Layer, LayerEquation, Waveguide};
+use tactile_imaging::elasticity::contact::{Bond, Layer, Waveguide};
+use tactile_imaging::elasticity::laws::RigidBallLaw;
 use tactile_imaging::elasticity::modulus::{
     Estimate, LoadSeries, LoadState, ModulusEstimator, SphereOnWaveguide,
 };
@@ -119,12 +120,8 @@ fn root(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
 /// States of a rigid ball on the layers.
 fn rigid_states(layers: &[Layer], radius_m: f64, forces: &[f64]) -> Vec<ContactState> {
     let guide = Waveguide::new(layers.to_vec()).unwrap();
-    let equation = LayerEquation::of_layers(&guide, Bond::Bonded).unwrap();
-    let top = layers[0].youngs_modulus_pa / (1.0 - layers[0].poisson_ratio.powi(2));
-    let force = |a: f64| {
-        let ratio = equation.solve(a / guide.thickness_m()).unwrap();
-        4.0 / 3.0 * top * a.powi(3) / radius_m * ratio.force_ratio_same_radius
-    };
+    let law = RigidBallLaw::new(&guide, [1e-4, 8e-3]).unwrap();
+    let force = |a: f64| law.log_force(radius_m, a).value().exp();
     let radius = |f: f64| root(1e-4, 8e-3, |a| f - force(a));
     forces
         .iter()
@@ -152,9 +149,7 @@ fn soft_states(layers: &[Layer], radius_m: f64, poisson: f64, forces: &[f64]) ->
 }
 
 pub(super) fn estimator(radius_m: f64, poisson: f64, guide: &Waveguide) -> SphereOnWaveguide {
-    SphereOnWaveguide::new(radius_m, poisson, guide, Bond::Bonded)
-        .unwrap()
-        .without_finite_strain()
+    SphereOnWaveguide::new(radius_m, poisson, guide, Bond::Bonded).unwrap()
 }
 
 impl Simulated {

@@ -2,6 +2,7 @@
 //! chosen within them.
 
 use super::*;
+use tactile_elasticity::laws::RigidBallLaw;
 
 #[test]
 fn every_law_inverts_itself() {
@@ -145,5 +146,32 @@ fn balls_of_every_stiffness_and_size_invert_on_layers() {
                 }
             }
         }
+    }
+}
+
+/// Contacts of rigid balls by the finite elements of `tactile-fem` (ν 0.4999): layers (thickness,
+/// modulus), ball radius, force, contact radius. None was used for the fit of the law.
+#[test]
+fn rigid_balls_follow_finite_elements() {
+    const PAPER: &[[f64; 2]] = &[[2e-3, 136e3], [3e-3, 80e3], [5e-3, 34e3]];
+    const STACK: &[[f64; 2]] = &[[4e-3, 70e3], [4e-3, 140e3]];
+    const DEEP: &[[f64; 2]] = &[[10e-3, 60e3]];
+    for (layers, ball_radius_m, force_n, a) in [
+        (DEEP, 4e-3, 0.0738096, 1.405844e-3),
+        (DEEP, 4e-3, 0.6228510, 2.759746e-3),
+        (DEEP, 8e-3, 0.7286625, 3.723915e-3),
+        (&[[4e-3, 90e3]], 4e-3, 0.1503754, 1.532135e-3),
+        (&[[4e-3, 90e3]], 8e-3, 2.5621142, 4.362591e-3),
+        (STACK, 4e-3, 0.9677733, 2.928463e-3),
+        (STACK, 8e-3, 0.1083749, 1.896468e-3),
+        (PAPER, 4e-3, 0.1128228, 1.263046e-3),
+        (PAPER, 8e-3, 0.8279150, 3.324237e-3),
+    ] {
+        let law = RigidBallLaw::new(&guide(layers, 0.4999), [a; 2]).unwrap();
+        let found = law.log_force(ball_radius_m, a);
+        // Three standard errors, in which the radius of the elements has 0.1 %.
+        let z = (found.value() - f64::ln(force_n)) / found.error().hypot(3e-3);
+        assert!(z.abs() < 3.0, "{layers:?} {ball_radius_m} {a}: {z}");
+        assert!(found.error() < 0.012);
     }
 }
