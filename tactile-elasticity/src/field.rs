@@ -204,11 +204,11 @@ impl StrainField {
 const EDGE_PX: f64 = 0.5;
 
 impl StrainField {
-    /// Standard errors of the mean Green–Lagrange strain between matched points of two reconstructed
-    /// surfaces.
+    /// Standard errors of the mean Green–Lagrange strain between matched points of two
+    /// reconstructed surfaces.
     ///
-    /// `grid_m` is the pixel size of the surfaces in metres. `run_length` is the number of consecutive
-    /// neighbours that share the errors of a surface. O(n).
+    /// `grid_m` is the pixel size of the surfaces in metres. `run_length` is the number of
+    /// consecutive neighbours that share the errors of a surface. O(n).
     ///
     /// ```
     /// use nalgebra::Point3;

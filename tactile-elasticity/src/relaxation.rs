@@ -179,19 +179,20 @@ const TREND: f64 = 6.63;
 const STRONG_EVIDENCE: f64 = 6.0;
 
 impl TimeDependence {
-    /// Distinguishes a relaxing sample from a drifting sensor, from the moduli of single loads in the
-    /// order of time.
+    /// Distinguishes a relaxing sample from a drifting sensor, from the moduli of single loads in
+    /// the order of time.
     ///
-    /// `scale_error` is the relative standard error common to all moduli, which widens the intervals of
-    /// E₀ and E∞. `law_error` is the relative error of the law behind the moduli, for loads that differ
-    /// by a factor of e. It prevents an increasing load from being mistaken for an effect of time.
+    /// `scale_error` is the relative standard error common to all moduli, which widens the
+    /// intervals of E₀ and E∞. `law_error` is the relative error of the law behind the moduli, for
+    /// loads that differ by a factor of e. It prevents an increasing load from being mistaken for
+    /// an effect of time.
     ///
-    /// Five loads at different times are needed. With fewer, only a significant trend is reported, as
-    /// [`Undecided`](Self::Undecided). A solid is reported if the likelihood ratio against a constant
-    /// exceeds 8 (1 % of constant series do), the Bayesian criterion prefers it to a drift by more than
-    /// 6, and its time constant does not exceed the duration of the series. If the moduli scatter about
-    /// the best solid by more than their errors, the errors are scaled up. O(n) for each of about 400
-    /// time constants.
+    /// Five loads at different times are needed. With fewer, only a significant trend is reported,
+    /// as [`Undecided`](Self::Undecided). A solid is reported if the likelihood ratio against a
+    /// constant exceeds 8 (1 % of constant series do), the Bayesian criterion prefers it to a drift
+    /// by more than 6, and its time constant does not exceed the duration of the series. If the
+    /// moduli scatter about the best solid by more than their errors, the errors are scaled up.
+    /// O(n) for each of about 400 time constants.
     ///
     /// # Errors
     /// [`ElasticityError::TooFewLoads`] without loads, [`ElasticityError::NotPositive`] for forces,

@@ -275,8 +275,8 @@ impl IlluminationDrift {
         }
     }
 
-    /// One least-squares step of the coefficients, using the tiles whose level per pixel is within a
-    /// limit. `sd` is the noise of one pixel. Returns the number of tiles.
+    /// One least-squares step of the coefficients, using the tiles whose level per pixel is within
+    /// a limit. `sd` is the noise of one pixel. Returns the number of tiles.
     ///
     /// Positions are relative to the centre of the frame, in units of half the frame.
     fn step(&mut self, tiles: &[TileSum], limit: f64, sd: f64) -> usize {

@@ -168,13 +168,13 @@ impl ReferenceFrame {
         self.noise
     }
 
-    /// Difference of the light in a frame without contact from that in the reference, in grey levels:
-    /// the mean over the block of 8 × 8 pixels where it is largest. The last blocks end at the edge of
-    /// the frame.
+    /// Difference of the light in a frame without contact from that in the reference, in grey
+    /// levels: the mean over the block of 8 × 8 pixels where it is largest. The last blocks end at
+    /// the edge of the frame.
     ///
-    /// `None` for a difference of up to 4 grey levels, which may be noise, and for images that differ
-    /// in size. A larger difference means that the light has changed, or that frame and reference were
-    /// swapped. O(pixels).
+    /// `None` for a difference of up to 4 grey levels, which may be noise, and for images that
+    /// differ in size. A larger difference means that the light has changed, or that frame and
+    /// reference were swapped. O(pixels).
     ///
     /// ```
     /// use ndarray::Array2;
@@ -222,13 +222,13 @@ impl ReferenceFrame {
         (shift.abs() > 4.0).then_some(shift)
     }
 
-    /// The median of frame minus reference outside the box of a contact, in grey levels, from about 24
-    /// rows, with its standard error.
+    /// The median of frame minus reference outside the box of a contact, in grey levels, from about
+    /// 24 rows, with its standard error.
     ///
-    /// Integer grey levels are treated as distributed uniformly over their width, so that a change of a
-    /// fraction of a level is detected. `None` for fewer than 100 pixels and for images that differ in
-    /// size. A mean would be affected by the surroundings of the contact: a dent in a dark sensor is
-    /// wider than the contact. O(examined rows).
+    /// Integer grey levels are treated as distributed uniformly over their width, so that a change
+    /// of a fraction of a level is detected. `None` for fewer than 100 pixels and for images that
+    /// differ in size. A mean would be affected by the surroundings of the contact: a dent in a
+    /// dark sensor is wider than the contact. O(examined rows).
     ///
     /// ```
     /// use ndarray::Array2;

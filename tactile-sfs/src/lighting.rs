@@ -25,7 +25,6 @@ use tactile_core::Requirement;
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
 pub struct Lighting<T> {
     direction: [T; 3],
     ambient: T,

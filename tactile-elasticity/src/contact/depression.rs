@@ -5,19 +5,20 @@ use super::waveguide::Waveguide;
 use crate::error::{ElasticityError, Quantity};
 
 impl Waveguide {
-    /// Depth in metres by which a ball's contact indents the surface of layers, at each distance from
-    /// its centre.
+    /// Depth in metres by which a ball's contact indents the surface of layers, at each distance
+    /// from its centre.
     ///
     /// ```math
     /// u(r) = \frac{2}{E^*} \int_0^\infty L(kh)\, P(k)\, J_0(kr)\, dk, \qquad
     /// P(k) = p_0 \frac{\sin ka - ka \cos ka}{a k^3}, \qquad p_0 = \frac{3F}{2\pi a^2}
     /// ```
     ///
-    /// with E* = E/(1 − ν²) of the touched layer and L the compliance of the layers relative to that of
-    /// a half-space (Johnson, *Contact Mechanics*, 1985, 5.8). The part of the half-space is Hertz's
-    /// closed form, so only the difference is integrated. Strains are assumed small and the pressure
-    /// Hertzian; on layers that are thin compared with the contact, the pressure is flatter. It costs
-    /// several hundred solutions of the layers, and as many Bessel functions per distance.
+    /// with E* = E/(1 − ν²) of the touched layer and L the compliance of the layers relative to
+    /// that of a half-space (Johnson, *Contact Mechanics*, 1985, 5.8). The part of the half-space
+    /// is Hertz's closed form, so only the difference is integrated. Strains are assumed small and
+    /// the pressure Hertzian; on layers that are thin compared with the contact, the pressure is
+    /// flatter. It costs several hundred solutions of the layers, and as many Bessel functions per
+    /// distance.
     ///
     /// ```
     /// use tactile_elasticity::contact::{Bond, Layer, Waveguide};

@@ -34,8 +34,8 @@ impl Layer {
         Some(plane_strain.ln() + contact.force_ratio_same_radius.ln())
     }
 
-    /// Layers with their parameters changed by a step: ln E of all layers, then ln h, then ν, which is
-    /// limited to ½.
+    /// Layers with their parameters changed by a step: ln E of all layers, then ln h, then ν, which
+    /// is limited to ½.
     ///
     /// ```
     /// use nalgebra::DVector;
@@ -55,9 +55,9 @@ impl Layer {
     }
 
     /// Derivatives of values by parameters x, such as of forces by those of
-    /// [`stepped`](Self::stepped), as a matrix \[value, parameter\]. `here` holds the values at x. Steps are
-    /// negative, because ν is at most ½. Parameters without a step have zeros. `None` if the values are
-    /// `None`.
+    /// [`stepped`](Self::stepped), as a matrix \[value, parameter\]. `here` holds the values at x.
+    /// Steps are negative, because ν is at most ½. Parameters without a step have zeros. `None` if
+    /// the values are `None`.
     ///
     /// ```
     /// use nalgebra::DVector;

@@ -67,12 +67,13 @@ impl HertzContact {
         })
     }
 
-    /// Normal displacement (m) at distance r of a half-space under p₀√(1 − r²/a²) (Johnson 1985, eq.
-    /// 3.42).
+    /// Normal displacement (m) at distance r of a half-space under p₀√(1 − r²/a²) (Johnson 1985,
+    /// eq. 3.42).
     ///
-    /// Inside the contact it is π p₀(2a² − r²)/(4aE*). Outside it is p₀/(2aE*)·[(2a² − r²) asin(a/r) +
-    /// a√(r² − a²)]. Its terms cancel to (a/r)², so from r = 2a on it is summed as ½ p₀ a/E* Σ 4 b_k
-    /// (a/r)^(2k+1)/((2k+1)(2k+3)) with b_k = (2k)!/(4ᵏ k!²), whose terms are all positive.
+    /// Inside the contact it is π p₀(2a² − r²)/(4aE*). Outside it is p₀/(2aE*)·[(2a² − r²)
+    /// asin(a/r) + a√(r² − a²)]. Its terms cancel to (a/r)², so from r = 2a on it is summed as ½ p₀
+    /// a/E* Σ 4 b_k (a/r)^(2k+1)/((2k+1)(2k+3)) with b_k = (2k)!/(4ᵏ k!²), whose terms are all
+    /// positive.
     ///
     /// ```
     /// use tactile_elasticity::contact::HertzContact;

@@ -120,12 +120,12 @@ impl UniaxialLoads {
         })
     }
 
-    /// Relative excess of the ratio of conjugate stress to strain over the modulus, for a uniaxially
-    /// stretched rubber at a strain of this measure.
+    /// Relative excess of the ratio of conjugate stress to strain over the modulus, for a
+    /// uniaxially stretched rubber at a strain of this measure.
     ///
     /// An incompressible neo-Hookean solid has the nominal stress P = E (λ − λ⁻²)/3. Its [conjugate
-    /// stress](StrainMeasure::conjugate_stress) over the strain equals E only at small strain: at −9 %
-    /// it is 1.28 E for Green–Lagrange and 0.96 E for Hencky.
+    /// stress](StrainMeasure::conjugate_stress) over the strain equals E only at small strain: at
+    /// −9 % it is 1.28 E for Green–Lagrange and 0.96 E for Hencky.
     ///
     /// # Errors
     /// [`ElasticityError::NoConjugateStress`], and [`ElasticityError::SingularDeformation`] for a
