@@ -140,7 +140,8 @@ impl fmt::Display for Skip {
 /// ```
 /// use std::time::Duration;
 /// use tactile_imaging::pipeline::Work;
-/// let work = Work { runs: 4, time: Duration::from_micros(1250) };
+/// let mut work = Work::default();
+/// (work.runs, work.time) = (4, Duration::from_micros(1250));
 /// assert_eq!(work.to_string(), "1.250 ms in 4 runs");
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -26,7 +26,6 @@ use std::fmt::{self, Display, Formatter};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[non_exhaustive]
 pub struct TimeResult {
     /// Time of the first load that has a modulus, in seconds since the object touched.
     pub from_s: f64,
