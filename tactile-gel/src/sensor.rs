@@ -18,7 +18,7 @@ use crate::{BallPress, CalibrationReport, GelError, GelFrame, GelImage, GelModel
 /// let sensor = GelSensor::new(model, &reference)?;
 /// let mut frame = reference.clone();
 /// frame.slice_mut(s![10..30, 10..30]).fill(140);
-/// frame.slice_mut(s![40..50, 40..50]).fill(120);
+/// frame.slice_mut(s![38..58, 38..58]).fill(120);
 /// let found = sensor.read(&frame)?;
 /// let depth = |k: usize| found.contacts[k].depth_below_far_m.value;
 /// assert!((depth(0) - 3e-4).abs() < 1e-12 && (depth(1) - 4e-4).abs() < 1e-12);

@@ -88,7 +88,8 @@ impl BitOrAssign for PixelFlags {
 ///     .integrate(slopes.view(), slopes.view(), &domain)?
 ///     .report;
 /// assert_eq!(report.components.len(), 2);
-/// assert_eq!(report.components[1], Component { pixels: 2, first: [0, 3], mean_height: 0.0 });
+/// let Component { pixels, first, .. } = report.components[1];
+/// assert_eq!((pixels, first), (2, [0, 3]));
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]

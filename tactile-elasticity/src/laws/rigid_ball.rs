@@ -25,13 +25,13 @@ const LEAST_HALF_WIDTH: f64 = 0.05;
 /// use tactile_elasticity::contact::{Layer, Waveguide};
 /// use tactile_elasticity::laws::RigidBallLaw;
 /// let gel = Layer { thickness_m: 10e-3, youngs_modulus_pa: 75e3, poisson_ratio: 0.5 };
-/// let law = RigidBallLaw::new(&Waveguide::new(vec![gel])?, [0.2e-3, 2e-3])?;
-/// // A small contact is Hertz's on a half-space with E/(1 − ν²) = 100 kPa, a large one is not.
+/// let law = RigidBallLaw::new(&Waveguide::new(vec![gel])?, [0.2e-3, 8e-3])?;
+/// // A small contact is Hertz's on a half-space with E/(1 − ν²) = 100 kPa, one as wide as the layer is not.
 /// let over_hertz = |radius_m: f64, a: f64| {
 ///     law.log_force(radius_m, a).value().exp() / (4.0 / 3.0 * 100e3 * a.powi(3) / radius_m)
 /// };
 /// assert!((over_hertz(20e-3, 0.2e-3) - 1.0).abs() < 0.03);
-/// assert!(over_hertz(4e-3, 2e-3) > 1.2);
+/// assert!(over_hertz(20e-3, 8e-3) > 1.2);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone)]
