@@ -177,7 +177,7 @@ const APPARENT: [(Coordinate, f64); 4] = [
     (Coordinate::Aspect, 0.25),
     (Coordinate::Diameter, 0.06),
     (Coordinate::Depth, 0.1),
-    (Coordinate::LumpModulus, 0.8),
+    (Coordinate::LumpModulus, 0.3),
 ];
 
 /// Error of the pressure on a whole face on the scale of the elements, in addition to that of
