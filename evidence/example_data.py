@@ -396,7 +396,7 @@ FILES = {
     "press/reference.png": lambda: frame(0.0, 0),
     "press/frame_1.png": lambda: frame(LOADS_N[0], 40_000),
     "press/frame_2.png": lambda: frame(LOADS_N[1], 80_000),
-    "press/weight.png": lambda: frame(GRAVITY * WEIGHT_KG, 120_000),
+    "press/weight.png": lambda: frame(GRAVITY * WEIGHT_KG, 180_000),
     "press/calibration.csv": calibration,
     "press/scene.toml": scene,
     "press/skin.toml": skin_scene,

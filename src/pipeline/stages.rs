@@ -95,7 +95,7 @@ impl Stages {
             if contact.background_step_grey.is_none()
                 && let Some(bounds) = contact.bounds()
             {
-                let step = self.reference.median_shift_outside(image, bounds);
+                let step = self.reference.shift_outside(image, bounds);
                 // A twentieth of a grey level is half a per cent of a dim background, and noise
                 // exceeds five standard errors once in a million frames.
                 let limit = |step: Estimate| 0.05_f64.max(5.0 * step.standard_error);
