@@ -2,8 +2,9 @@
 use super::error::PipelineError;
 use crate::core::StopReason;
 use crate::force::{
-    BoundingBox, Estimate, FaceReading, ForceError, ForceMeasurement, ForceWorkspace, LensGeometry,
-    LocalCalibration, PairsDoubt, Polarity, ProfileShape, ReferenceFrame, Uncertain,
+    BoundingBox, CalibrationDoubt, Estimate, FaceReading, ForceError, ForceMeasurement,
+    ForceWorkspace, LensGeometry, LocalCalibration, Polarity, ProfileShape, ReferenceFrame,
+    Uncertain,
 };
 use ndarray::{Array2, ArrayView2};
 use std::f64::consts::PI;
@@ -101,7 +102,7 @@ pub trait ContactStage: Send + Sync {
     }
 
     /// Doubts about the pairs from which the forces follow.
-    fn doubts(&self) -> &[PairsDoubt] {
+    fn doubts(&self) -> &[CalibrationDoubt] {
         &[]
     }
 
@@ -164,7 +165,7 @@ impl<P: Deref<Target: ContactStage> + Send + Sync> ContactStage for P {
         (**self).reads_light()
     }
 
-    fn doubts(&self) -> &[PairsDoubt] {
+    fn doubts(&self) -> &[CalibrationDoubt] {
         (**self).doubts()
     }
 
