@@ -14,10 +14,13 @@ ROOT = DATA.parents[1]
 
 
 def printed(notebook):
-    """The numbers in the output of each cell."""
-    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
-    texts = (output.get("text") or output.get("data", {}).get("text/plain", "") for output in outputs)
-    return [[float(number) for number in re.findall(r"-?\d+\.?\d*(?:e[-+]?\d+)?", text)] for text in texts]
+    """The numbers in the output of each cell. A slow kernel sends the lines of a cell in several pieces."""
+
+    def text(cell):
+        outputs = cell.get("outputs", [])
+        return "".join(output.get("text") or output.get("data", {}).get("text/plain", "") for output in outputs)
+
+    return [[float(number) for number in re.findall(r"-?\d+\.?\d*(?:e[-+]?\d+)?", text(cell))] for cell in notebook.cells]
 
 
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.ipynb")), ids=lambda path: path.stem)
