@@ -14,9 +14,11 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use tactile_files::io::{Grey, read_bytes};
 use tactile_files::sensor::{GelFile, GelPresses};
+use tactile_imaging::PairsDoubt;
 use tactile_imaging::core::Estimate;
 use tactile_imaging::gel::{
-    BallFace, CalibrationReport, GelContact, GelFrame, GelImage, GelLaw, GelModel, GelSensor,
+    BallFace, CalibrationReport, GelContact, GelFrame, GelImage, GelLaw, GelMarkers, GelModel,
+    GelSensor, GelWrench, MarkerSlip,
 };
 use tactile_imaging::pipeline::BallFit;
 use tactile_imaging::sfs::Domain;
@@ -206,6 +208,32 @@ impl Reader {
         }
     }
 
+    /// A follower of the dots, if the gel has any.
+    pub(crate) fn markers(&self) -> Option<GelMarkers> {
+        self.sensor
+            .has_dots()
+            .then(|| GelMarkers::new(&self.sensor))
+    }
+
+    /// Force, torque and slip from the dots of a frame.
+    pub(crate) fn sideways(
+        &self,
+        markers: &mut GelMarkers,
+        frame: GelImage<'_>,
+        reading: &GelFrame,
+    ) -> Result<Sideways, String> {
+        let slip = markers.follow(frame, reading);
+        let slip = slip.map_err(|error| error.to_string())?;
+        if let Some(doubt) = markers.field().doubt {
+            return Err(PairsDoubt::Matcher(doubt).to_string());
+        }
+        let wrench = match &self.law {
+            Ok(GelLaw::Layer(law)) => law.wrench(reading, Some(markers.field())),
+            _ => None,
+        };
+        Ok(Sideways { wrench, slip })
+    }
+
     /// The total force of a frame: `None` without contact, or the reason why there is none.
     pub(crate) fn force(&self, reading: &GelFrame) -> Result<Option<Estimate>, String> {
         let law = self.law.as_ref().map_err(String::clone)?;
@@ -217,6 +245,40 @@ impl Reader {
         match &self.law {
             Ok(law) => law.forces(reading).into_iter().map(Some).collect(),
             Err(_) => vec![None; reading.contacts.len()],
+        }
+    }
+}
+
+/// What the dots of a gel show of a frame.
+#[derive(Clone, Copy, Serialize)]
+pub(crate) struct Sideways {
+    /// Forces and torques. `None` without contact, or for a sensor without a gel layer.
+    pub wrench: Option<GelWrench>,
+    /// Slip since the contact began. `None` with fewer than four dots under it.
+    pub slip: Option<MarkerSlip>,
+}
+
+impl Sideways {
+    fn print(&self, context: &mut Context) {
+        if let Some(wrench) = &self.wrench {
+            let [x, y, _] = wrench.force_n;
+            let torque = wrench.torque_nm[2];
+            for (name, force) in [("force along x", x), ("force along y", y)] {
+                if let Some(force) = force {
+                    context.row(name, in_unit(force, 1.0) + " N");
+                }
+            }
+            if let Some(torque) = torque {
+                context.row("torque about z", in_unit(torque, 1e3) + " mN m");
+            }
+        }
+        if let Some(slip) = &self.slip {
+            let percent = 100.0 * slip.share;
+            let text = format!(
+                "{percent:.0} % of {} dots since the contact began",
+                slip.markers
+            );
+            context.row("slip", text);
         }
     }
 }
@@ -317,6 +379,7 @@ fn depth_of<P: Pixels>(
     let names: Vec<_> = names.collect();
     context.outputs.plan(&names, inputs)?;
     let mut values = Vec::new();
+    let mut markers = reader.markers();
     for (image, names) in images.iter().zip(names.chunks(SUFFIXES.len())) {
         let NamedFrame { name, pixels, .. } = image;
         let reading = reader.sensor.read(pixels.image());
@@ -355,6 +418,18 @@ fn depth_of<P: Pixels>(
             value["force_n"] = number_or_error(&force);
         } else if forces {
             value["force_n"] = Value::Null;
+        }
+        if let Some(markers) = markers.as_mut().filter(|_| forces && !reading.is_refused()) {
+            match reader.sideways(markers, pixels.image(), &reading) {
+                Ok(sideways) => {
+                    sideways.print(context);
+                    value["dots"] = json!(sideways);
+                }
+                Err(reason) => {
+                    context.warn("doubtful_pairs", json!({ "frame": name }), &reason);
+                    value["dots"] = json!({ "error": reason });
+                }
+            }
         }
         values.push(value);
         if let Some(report) = context

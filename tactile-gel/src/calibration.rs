@@ -8,6 +8,7 @@ use tactile_core::{InvalidOption, Requirement};
 
 use crate::ball::{BallFace, Evidence};
 use crate::colour::{ColourSensor, colour_image};
+use crate::dots;
 use crate::error::same_shape;
 use crate::face::gradient_errors;
 use crate::frame_check::FrameDoubt;
@@ -258,7 +259,10 @@ impl ColourSensor {
         if verdict.face != fit.face {
             fit = Fitted::of(&blank, &presses, verdict.face)?;
         }
-        let (model, median_angle_deg) = fit.judged(&blank, &presses)?;
+        let (mut model, median_angle_deg) = fit.judged(&blank, &presses)?;
+        if blank.has_dots {
+            model.slope_standard_error = model.slope_standard_error.hypot(dots::SLOPE_ERROR);
+        }
         let sensor = blank.with_model(model);
         doubts.extend(verdict.factor.map(CalibrationDoubt::BallSize));
         let balls = presses.iter().map(|press| press.ball_px);
@@ -431,7 +435,7 @@ impl Press {
         };
         let (rows, columns, _) = colour_image(frame)?.dim();
         same_shape("frame of a press", blank.shape(), (rows, columns))?;
-        let (frame, doubts) = blank.checked(Blurred::of(frame));
+        let (frame, doubts) = blank.checked(frame);
         let press = Self {
             frame,
             ball_px: press.ball_radius_m / blank.model.pixel_size_m,

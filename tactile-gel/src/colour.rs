@@ -13,6 +13,7 @@ use tactile_core::{Requirement, vectorised};
 
 use crate::GelError;
 use crate::contacts::{Cells, Patch, block_means, patches};
+use crate::dots::{are_printed, without_dots};
 use crate::error::same_shape;
 use crate::face::{self, GelFrame, SurfaceCheck};
 use crate::frame_check::{Blocks, FrameDoubt, light};
@@ -40,6 +41,8 @@ const ROOM: f64 = 0.2;
 pub(crate) struct ColourSensor {
     pub(crate) model: ColourModel,
     untouched: Arc<Array3<u8>>,
+    /// Whether dots are printed on the gel.
+    pub(crate) has_dots: bool,
     pub(crate) reference: Arc<Blurred>,
     blocks: Arc<Blocks>,
     pub(crate) plane: Arc<Plane>,
@@ -64,8 +67,10 @@ impl ColourSensor {
 
     pub(crate) fn of_checked(model: ColourModel, reference: ArrayView3<'_, u8>) -> Self {
         let (rows, columns, _) = reference.dim();
-        let blurred = Blurred::of(reference);
+        let has_dots = are_printed(reference);
+        let blurred = blurred(reference, has_dots);
         Self {
+            has_dots,
             untouched: Arc::new(reference.to_owned()),
             blocks: Arc::new(Blocks::of(&blurred)),
             plane: Arc::new(Plane::new((rows / 2, columns / 2), ROOM, None)),
@@ -97,7 +102,7 @@ impl ColourSensor {
         let frame = colour_image(frame)?;
         let (rows, columns, _) = frame.dim();
         same_shape("frame", self.reference.dim(), (rows, columns))?;
-        let (frame, doubts) = self.checked(Blurred::of(frame));
+        let (frame, doubts) = self.checked(frame);
         if doubts.iter().any(FrameDoubt::refuses) {
             return Ok(GelFrame::refused((rows, columns), doubts));
         }
@@ -105,7 +110,8 @@ impl ColourSensor {
     }
 
     /// A frame corrected to the exposure of the reference, with doubts about its origin.
-    pub(crate) fn checked(&self, frame: Blurred) -> (Blurred, Vec<FrameDoubt>) {
+    pub(crate) fn checked(&self, frame: ArrayView3<'_, u8>) -> (Blurred, Vec<FrameDoubt>) {
+        let frame = blurred(frame, self.has_dots);
         let light = light(&Blocks::of(&frame), &self.blocks);
         (frame.divided_by(light.gain), light.doubts)
     }
@@ -157,6 +163,13 @@ impl ColourSensor {
         let linear = self.model.coefficients.iter().flat_map(|c| &c[1..4]);
         let square: f64 = linear.map(|c| c * c).sum();
         (LEAST_NOISE_GREY * SMOOTHED / 50.0 * (0.5 * square).sqrt()) as f32
+    }
+}
+
+fn blurred(frame: ArrayView3<'_, u8>, has_dots: bool) -> Blurred {
+    match has_dots {
+        true => Blurred::of(without_dots(frame).view()),
+        false => Blurred::of(frame),
     }
 }
 

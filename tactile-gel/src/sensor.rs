@@ -138,6 +138,17 @@ impl GelSensor {
         }
     }
 
+    /// Whether dots are printed on a gel lit in colours: at least twelve dark patches of one size in
+    /// the frame without contact. They are not taken for slopes, and [`GelMarkers`] follows them.
+    ///
+    /// [`GelMarkers`]: crate::GelMarkers
+    pub fn has_dots(&self) -> bool {
+        match &self.kind {
+            Kind::Colour(sensor) => sensor.has_dots,
+            Kind::Dark(_) => false,
+        }
+    }
+
     /// Number of rows and columns of its frames.
     pub fn shape(&self) -> (usize, usize) {
         self.reference().dim()

@@ -5,7 +5,7 @@ use super::json::assert_keeps_to_schema;
 use super::streams::piped;
 use serde_json::Value;
 use std::fs;
-use tactile_files::io::read_colour_levels;
+use tactile_files::io::{read_colour_levels, write_colour_image};
 
 #[test]
 fn a_calibrated_gel_gives_depth_and_gradients() {
@@ -156,6 +156,81 @@ fn a_known_weight_makes_forces() {
     let second = rows.lines().nth(1).and_then(|row| row.split(',').nth(1));
     let force: f64 = second.unwrap().parse().unwrap();
     assert!((force - 2.0).abs() < 1e-6, "{rows}");
+}
+
+/// Dots printed on all frames of the example, every 15 px, and moved by 2 px in the last press: the
+/// depth is that without dots, and the shear force that of the layer over all cells.
+#[test]
+fn dots_on_a_gel_give_its_force_sideways() {
+    let folder = folder_with_examples();
+    let data = folder.path().join("examples/data/colour");
+    let made = folder.path().join("dotted");
+    fs::create_dir(&made).unwrap();
+    let print = |from: &str, to: &str, shift: f64| {
+        let mut levels = read_colour_levels(data.join(from)).unwrap();
+        let near = |at: f64| (at - 7.5).rem_euclid(15.0) - 7.5;
+        for ((row, column, _), level) in levels.indexed_iter_mut() {
+            let [x, y] = [near(column as f64 - 7.5 - shift), near(row as f64 - 7.5)];
+            let cover = 1.0 / (1.0 + (2.0 * (x.hypot(y) - 2.5)).exp());
+            *level = (f64::from(*level) * (1.0 - 0.8 * cover)).round() as u8;
+        }
+        write_colour_image(made.join(to), levels.view()).unwrap();
+    };
+    for name in [
+        "reference",
+        "press_1",
+        "press_2",
+        "press_3",
+        "press_4",
+        "press_5",
+        "press_6",
+    ] {
+        print(&format!("{name}.png"), &format!("{name}.png"), 0.0);
+    }
+    print("press_6.png", "sheared.png", 2.0);
+    let text = fs::read_to_string(data.join("calibration.toml")).unwrap();
+    let gel = "[gel]\nthickness_m = 4e-3\nyoungs_modulus_pa = 1.2e5\nyoungs_modulus_error_pa = 0";
+    let [thickness, modulus] = [4e-3, 1.2e5];
+    fs::write(made.join("calibration.toml"), format!("{text}\n{gel}\n")).unwrap();
+    let call = |line: &str| printed(folder.path(), line);
+    call("calibrate dotted/calibration.toml --out made/dots.toml");
+    let frames = "dotted/press_6.png dotted/sheared.png";
+    let found = call(&format!("measure made/dots.toml {frames} --json"));
+    let found: Value = serde_json::from_str(&found).unwrap();
+    assert_keeps_to_schema(&found, "measure");
+    // As without dots, within the 3 % of the calibration and the 6 % of the dots.
+    let depth = |k: usize| {
+        let contact = &found["frames"][k]["contact"];
+        contact["largest_depth_m"]["value"].as_f64().unwrap()
+    };
+    let truth = 50e-6 * 16.0_f64.powi(2) / 48.0;
+    assert!(
+        (0..2).all(|k| (depth(k) / truth - 1.0).abs() < 0.15),
+        "{found}"
+    );
+    // 48 cells of 15 by 15 pixels move by 2 pixels of 50 µm. Poisson's ratio is 0.48.
+    let truth = modulus / 2.96 / thickness * 48.0 * (15.0 * 50e-6_f64).powi(2) * 100e-6;
+    let along = |k: usize| {
+        let force = &found["frames"][k]["dots"]["wrench"]["force_n"][0]["value"];
+        force.as_f64().unwrap()
+    };
+    assert!(along(0).abs() < 0.02 * truth, "{found}");
+    // Dots cut by the border are left out, and the edges of others are lit by the contact.
+    assert!(
+        (along(1) / truth - 1.0).abs() < 0.05,
+        "{} {truth}",
+        along(1)
+    );
+    let stream = format!("stream made/dots.toml {frames} --allowed-late 100 --out made");
+    call(&stream);
+    let rows = fs::read_to_string(folder.path().join("made/stream.csv")).unwrap();
+    let heading: Vec<_> = rows.lines().next().unwrap().split(',').collect();
+    let column = heading
+        .iter()
+        .position(|name| *name == "force_x_N")
+        .unwrap();
+    let last: Vec<_> = rows.lines().last().unwrap().split(',').collect();
+    assert_eq!(last[column].parse::<f64>().unwrap(), along(1), "{rows}");
 }
 
 /// Frames from a camera, as a sequence of PPM images, have the same results as the files.

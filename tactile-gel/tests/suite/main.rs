@@ -1,6 +1,7 @@
 //! The tests of `tactile-gel`, in a single program.
 
 mod dark;
+mod dots;
 mod markers;
 mod measured;
 mod other_frames;
