@@ -1,8 +1,8 @@
 //! Covariance of ring means: errors of the sensor and of the model.
 
-use crate::forward::{Forward, Solved};
-use crate::parameters::{Coordinate, Parameters};
-use crate::picture::CellPositions;
+use crate::forward::Solved;
+use crate::parameters::Parameters;
+use crate::picture::{CellPositions, Cells};
 use crate::tissue_block::SensorErrors;
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -159,8 +159,6 @@ pub(crate) struct ObservedCells {
     pub even: Vec<f64>,
     /// Relative error of the pressure of an off-axis inclusion, for each cell.
     pub aside: Vec<f64>,
-    /// Errors of all pressures from each apparent parameter of an off-axis inclusion, in pascals.
-    pub apparent: Vec<Vec<f64>>,
 }
 
 /// Error of the pressure of an off-axis inclusion, relative to its distance from the axis in radii
@@ -168,17 +166,6 @@ pub(crate) struct ObservedCells {
 /// dimensions differ by 0.2 to 0.6 % of the pressure at 0.25 to 0.5 radii. Their inclusions raise
 /// the pressure by a fifth to a factor of three.
 const ASIDE: f64 = 0.034;
-
-/// Errors of the apparent parameters of an off-axis inclusion (logarithms), relative to its distance
-/// from the axis in radii of the face. They are the same in all presses: balls of 12 mm, 4 and 6 mm
-/// aside, appear 11 % too flat, 3 % too small, 4 % too deep and 20 % too stiff in solutions in three
-/// dimensions.
-const APPARENT: [(Coordinate, f64); 4] = [
-    (Coordinate::Aspect, 0.25),
-    (Coordinate::Diameter, 0.06),
-    (Coordinate::Depth, 0.1),
-    (Coordinate::LumpModulus, 0.3),
-];
 
 /// Error of the pressure on a whole face on the scale of the elements, in addition to that of
 /// rings. Solutions of plain blocks in three dimensions by another program scatter by 0.12 to 0.25
@@ -226,7 +213,6 @@ impl ObservedCells {
             even: even.collect(),
             per_approach: approaches_m.iter().map(|a| a.recip()).collect(),
             aside: vec![0.0; count],
-            apparent: Vec::new(),
             zero_error_m: if axes_m.len() > 1 { zero_error_m } else { 0.0 },
             place_error_m,
             positions: Arc::new(positions),
@@ -263,40 +249,23 @@ impl Observed {
 
     /// Adds the errors of the pressure of the first inclusion if it is off the axis, in quadrature
     /// with those of another inclusion. Far from a face the errors fade together with the
-    /// inclusion's contribution. `None` if the pressure has no derivatives.
+    /// inclusion's contribution. `face` are the cells of the model that was solved.
     pub(crate) fn with_lump_aside(
-        &self,
+        mut self,
         block: &Parameters,
-        forward: &Forward,
+        face: Option<&Cells>,
         solved: &Solved,
-    ) -> Option<Self> {
-        let mut observed = self.clone();
-        if let (Some(cells), Some(face)) = (&mut observed.cells, &forward.cells) {
-            let (presses, asides_m) = (&cells.positions.presses, cells.positions.asides_m(block));
+    ) -> Self {
+        if let (Some(cells), Some(face)) = (&mut self.cells, face) {
+            let asides_m = cells.positions.asides_m(block);
             let lift = face.lift(&solved.frames).min(1.0);
-            let aside = |press: usize| asides_m[press] / face.face_radius_m;
-            // One under the rim has a place and no size.
-            if !face.is_at_rim(block) {
-                let named = APPARENT.map(|(coordinate, _)| coordinate);
-                let derivatives = forward.derivatives(block, &named, solved)?;
-                for (derivative, (_, error)) in derivatives.into_iter().zip(APPARENT) {
-                    let by_press = derivative.into_iter().zip(presses.iter().cycle());
-                    let errors = by_press.map(|(by, press)| error * aside(*press) * by);
-                    cells.apparent.push(errors.collect());
-                }
-            }
-            for (before, press) in cells.aside.iter_mut().zip(presses) {
-                let share = lift * face.fade(asides_m[*press], asides_m[*press]);
-                *before = before.hypot(ASIDE * aside(*press) * share);
+            for (before, press) in cells.aside.iter_mut().zip(&cells.positions.presses) {
+                let aside_m = asides_m[*press];
+                let share = lift * face.fade(aside_m, aside_m);
+                *before = before.hypot(ASIDE * aside_m / face.face_radius_m * share);
             }
         }
-        Some(observed)
-    }
-
-    /// Covariance of two pressures because of off-axis inclusions' apparent parameters.
-    fn apparent(&self, row: usize, column: usize) -> f64 {
-        let apparent = self.cells.iter().flat_map(|cells| &cells.apparent);
-        apparent.map(|errors| errors[row] * errors[column]).sum()
+        self
     }
 
     /// Covariance of the relative errors of two cells because of an off-axis inclusion.
@@ -371,9 +340,8 @@ impl Observed {
                                 relative += sensor.each_frame.powi(2) * smooth;
                             }
                         }
-                        covariance[(row, column)] += relative * values[row] * values[column]
-                            + self.apparent(row, column)
-                            + sensor.zero_pa.powi(2);
+                        covariance[(row, column)] +=
+                            relative * values[row] * values[column] + sensor.zero_pa.powi(2);
                     }
                 }
             }

@@ -193,8 +193,8 @@ impl InclusionSearch {
             let mut lifts: f64 = 1.0;
             for lump in [&at, &at.swapped()] {
                 let (_, solved) = forward.predict_near(lump, None)?;
-                observed = observed.with_lump_aside(lump, &forward, &solved)?;
                 let cells = forward.cells.as_ref();
+                observed = observed.with_lump_aside(lump, cells, &solved);
                 lifts *= cells.map_or(0.0, |cells| cells.lift(&solved.frames).min(1.0));
             }
             let alone = NEIGHBOURS * lifts.sqrt() / apart(&at).max(1.0);

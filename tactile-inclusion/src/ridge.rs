@@ -333,7 +333,7 @@ impl Marginal {
             .collect();
         for point in &mut points {
             // Variance of the quadrature interval itself.
-            point.covariance[(index, index)] = step * step / 12.0;
+            point.covariance[(index, index)] += step * step / 12.0;
         }
         let largest = (points.iter())
             .map(|point| point.density)
