@@ -1,17 +1,19 @@
 //! Gel sensors, and markers printed on gels, from arrays.
-use crate::arrays::{self, Matrix, kept};
+use crate::arrays::{self, kept};
 use crate::errors::{self, TactileError, invalid};
-use crate::results::{Estimate, GelContact, GelReport, Markers, of_values};
-use ndarray::{Array2, Array3, s};
-use numpy::{PyArray2, PyArray3, PyArrayMethods};
+use crate::results::{Estimate, GelContact, GelFrame, GelReport, Markers, of_values};
+use ndarray::{Array2, s};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
 use tactile_files::io::Grey;
 use tactile_files::sensor::{CalibratedGel, GelFile, GelPixels, GelPresses};
+use tactile_imaging::core::Estimate as CoreEstimate;
 use tactile_imaging::gel::{
     BallPress, CalibrationReport, DarkModel, FrameDoubt, GaugeForce, GelError, GelFrame as Frame,
-    GelImage, GelLaw, GelLayer, GelSensor as Gel, find_markers, track_markers,
+    GelImage, GelLaw, GelLayer, GelMarkers, GelSensor as Gel, GelWrench, MarkerSlip, find_markers,
+    track_markers,
 };
 use tactile_imaging::matching::MatchError;
 
@@ -246,24 +248,36 @@ impl GelSensor {
     ///     The frame does not come from this sensor: black, white, noise, rotated, of another unit,
     ///     or with another order of channels.
     fn read(&self, py: Python<'_>, frame: &Bound<'_, PyAny>) -> PyResult<GelFrame> {
-        let frame = arrays::gel("frame", frame)?;
-        let found = py.detach(|| {
-            let frame = self.gel.sensor.read(self.order.rgb(&frame))?;
-            let forces = self
-                .law
-                .as_ref()
-                .map(|law| (law.forces(&frame), law.force(&frame)));
-            Ok((frame, forces))
-        });
-        let found: Result<_, GelError> = found;
-        let (frame, forces) = found.map_err(errors::refused)?;
-        let flags = frame.doubts.iter().map(|doubt| self.order.sentence(doubt));
-        if frame.is_refused() {
-            return Err(TactileError::new_err(flags.collect::<Vec<_>>().join("; ")));
+        self.measured(py, frame, None)
+    }
+
+    /// Reads frames one after the other and follows the dots of the gel, for shear and slip.
+    ///
+    /// Raises
+    /// ------
+    /// TactileError
+    ///     The gel has no dots (`has_dots`).
+    fn follower(slf: &Bound<'_, Self>) -> PyResult<GelFollower> {
+        let sensor = &slf.get().gel.sensor;
+        if !sensor.has_dots() {
+            return Err(TactileError::new_err(
+                "the gel has no printed dots to follow",
+            ));
         }
-        let flags = flags.collect();
-        let (each, force) = forces.unwrap_or_default();
-        GelFrame::new(py, frame, flags, &each, force, self.pixel_size())
+        Ok(GelFollower {
+            sensor: slf.clone().unbind(),
+            markers: Mutex::new(GelMarkers::new(sensor)),
+        })
+    }
+
+    /// Whether dots are printed on the gel.
+    #[getter]
+    fn has_dots(&self) -> bool {
+        self.gel.sensor.has_dots()
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        of_values(slf.py(), "reduced_gel", (slf,))
     }
 
     /// Report of the calibration. None for a sensor that was loaded.
@@ -300,6 +314,42 @@ impl GelSensor {
 }
 
 impl GelSensor {
+    fn measured(
+        &self,
+        py: Python<'_>,
+        frame: &Bound<'_, PyAny>,
+        markers: Option<&Mutex<GelMarkers>>,
+    ) -> PyResult<GelFrame> {
+        let given = arrays::gel("frame", frame)?;
+        let found = py.detach(|| {
+            let image = self.order.rgb(&given);
+            let frame = self.gel.sensor.read(image)?;
+            let mut forces = Forces {
+                normal: (self.law.as_ref()).map(|law| (law.forces(&frame), law.force(&frame))),
+                ..Forces::default()
+            };
+            let mut doubt = None;
+            if let Some(markers) = markers.filter(|_| !frame.is_refused()) {
+                // A follower that panicked has its last state.
+                let mut markers = markers.lock().unwrap_or_else(PoisonError::into_inner);
+                forces.slip = markers.follow(image, &frame)?;
+                doubt = markers.field().doubt.map(|doubt| doubt.to_string());
+                if let (Some(GelLaw::Layer(law)), None) = (&self.law, &doubt) {
+                    forces.wrench = law.wrench(&frame, Some(markers.field()));
+                }
+            }
+            Ok((frame, forces, doubt))
+        });
+        let found: Result<_, GelError> = found;
+        let (frame, forces, doubt) = found.map_err(errors::refused)?;
+        let flags = frame.doubts.iter().map(|doubt| self.order.sentence(doubt));
+        if frame.is_refused() {
+            return Err(TactileError::new_err(flags.collect::<Vec<_>>().join("; ")));
+        }
+        let flags = flags.chain(doubt).collect();
+        GelFrame::of(py, frame, flags, forces, self.pixel_size())
+    }
+
     fn new(
         py: Python<'_>,
         gel: CalibratedGel,
@@ -336,107 +386,45 @@ impl GelSensor {
     }
 }
 
-/// The results of one frame of a gel.
+/// Reads frames one after the other and follows the dots of the gel.
 #[pyclass(frozen, module = "tactile_imaging")]
-pub(crate) struct GelFrame {
-    /// Displacement of the surface into the gel in metres, zero far from contacts.
-    #[pyo3(get)]
-    depth: Matrix<f64>,
-    /// ∂depth/∂x along a row and ∂depth/∂y down the rows.
-    #[pyo3(get)]
-    gradient: (Matrix<f32>, Matrix<f32>),
-    /// Standard errors of the depth of a pixel and of the common zero level.
-    #[pyo3(get)]
-    depth_error: (f64, f64),
-    /// The contact of each pixel, from 1 in the order of `contacts`, and 0 without contact.
-    #[pyo3(get)]
-    labels: Matrix<u16>,
-    /// The contacts, with that of the highest pressure first.
-    #[pyo3(get)]
-    contacts: Vec<Py<GelContact>>,
-    /// Normal force of all contacts in newtons, for sensors with a layer.
-    #[pyo3(get)]
-    force: Option<Py<Estimate>>,
-    /// Doubts about the result, one sentence each.
-    #[pyo3(get)]
-    flags: Vec<String>,
-    pixel_size: f64,
+pub(crate) struct GelFollower {
+    sensor: Py<GelSensor>,
+    markers: Mutex<GelMarkers>,
 }
-
-const FIELDS: [&str; 7] = [
-    "depth",
-    "gradient",
-    "depth_error",
-    "labels",
-    "contacts",
-    "force",
-    "flags",
-];
 
 #[pymethods]
-impl GelFrame {
-    /// Unit normals of the surface, (rows, columns, 3). z points to the object.
-    fn normals<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f32>> {
-        let (p, q) = (
-            self.gradient.0.bind(py).readonly(),
-            self.gradient.1.bind(py).readonly(),
-        );
-        let (p, q) = (p.as_array(), q.as_array());
-        let (rows, columns) = p.dim();
-        let mut normals = Array3::zeros((rows, columns, 3));
-        for ((at, p), q) in p.indexed_iter().zip(&q) {
-            // The depth increases away from the object.
-            let length = (1.0 + p * p + q * q).sqrt();
-            for (k, part) in [*p, *q, 1.0].into_iter().enumerate() {
-                normals[[at.0, at.1, k]] = part / length;
-            }
-        }
-        PyArray3::from_owned_array(py, normals)
+impl GelFollower {
+    /// Like `GelSensor.read`, with shear, torque and slip. Between two frames dots on a grid must move
+    /// by less than a sixth of their pitch.
+    fn read(&self, py: Python<'_>, frame: &Bound<'_, PyAny>) -> PyResult<GelFrame> {
+        self.sensor.get().measured(py, frame, Some(&self.markers))
     }
 
-    /// The surface as points in metres, (rows × columns, 3): x, y, and z to the object.
-    fn points<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        let depth = self.depth.bind(py).readonly();
-        let depth = depth.as_array();
-        let mut points = Array2::zeros((depth.len(), 3));
-        for (mut point, ((row, column), z)) in points.outer_iter_mut().zip(depth.indexed_iter()) {
-            point[0] = column as f64 * self.pixel_size;
-            point[1] = row as f64 * self.pixel_size;
-            point[2] = -z;
-        }
-        PyArray2::from_owned_array(py, points)
-    }
-
-    /// Plots the depth with the outlines of the contacts, as a matplotlib figure.
-    fn plot<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let plots = slf.py().import("tactile_imaging._plot")?;
-        plots.call_method1("plot_gel", (slf,))
-    }
-
-    /// The fields by name. With `plain` they contain only numbers, text and lists.
-    #[pyo3(signature = (*, plain=false))]
-    fn to_dict<'py>(slf: &Bound<'py, Self>, plain: bool) -> PyResult<Bound<'py, PyAny>> {
-        of_values(slf.py(), "to_dict", (slf, plain, FIELDS.to_vec()))
-    }
-
-    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        let force = match &self.force {
-            Some(force) => format!(", force {} N", force.bind(py).str()?),
-            None => String::new(),
-        };
-        Ok(format!("GelFrame({} contacts{force})", self.contacts.len()))
+    fn __repr__(&self) -> String {
+        format!("GelFollower({})", self.sensor.get().__repr__())
     }
 }
 
+/// What is measured of a frame besides its face.
+#[derive(Default)]
+struct Forces {
+    /// Normal force of each contact, and of all.
+    normal: Option<(Vec<CoreEstimate>, Option<CoreEstimate>)>,
+    /// Forces along x and y and torque about z, from the dots.
+    wrench: Option<GelWrench>,
+    slip: Option<MarkerSlip>,
+}
+
 impl GelFrame {
-    fn new(
+    fn of(
         py: Python<'_>,
         frame: Frame,
         flags: Vec<String>,
-        forces: &[tactile_imaging::core::Estimate],
-        force: Option<tactile_imaging::core::Estimate>,
+        forces: Forces,
         pixel_size: f64,
     ) -> PyResult<Self> {
+        let (each, force) = forces.normal.unwrap_or_default();
         let contacts = frame.contacts.iter().enumerate().map(|(k, contact)| {
             let estimate = |estimate| Estimate::of(py, estimate);
             let [x, y] = contact.centroid_px;
@@ -457,7 +445,7 @@ impl GelFrame {
                     area: estimate(contact.area_m2)?,
                     depth: estimate(contact.depth_m)?,
                     depth_below_far: estimate(contact.depth_below_far_m)?,
-                    force: forces.get(k).copied().map(estimate).transpose()?,
+                    force: each.get(k).copied().map(estimate).transpose()?,
                     outline: kept(py, outline),
                     touches_edge: contact.touches_border,
                 },
@@ -465,13 +453,22 @@ impl GelFrame {
         });
         let [pixel, rest] = frame.depth_standard_error_m;
         let [p, q] = frame.gradient;
+        let estimate =
+            |value: Option<CoreEstimate>| value.map(|value| Estimate::of(py, value)).transpose();
+        let [shear_x, shear_y] = [0, 1].map(|k| forces.wrench.and_then(|w| w.force_n[k]));
+        let contacts = contacts.collect::<PyResult<Vec<_>>>()?;
+        let with_force = force.map_or_else(String::new, |f| format!(", force {:.4} N", f.value));
         Ok(Self {
-            contacts: contacts.collect::<PyResult<_>>()?,
+            text: format!("{} contacts{with_force}", contacts.len()),
+            contacts,
+            shear: estimate(shear_x)?.zip(estimate(shear_y)?),
+            torque: estimate(forces.wrench.and_then(|w| w.torque_nm[2]))?,
+            slip: forces.slip.map(|slip| slip.share),
             depth: kept(py, frame.depth_m),
             gradient: (kept(py, p), kept(py, q)),
             depth_error: (pixel, rest),
             labels: kept(py, frame.labels),
-            force: force.map(|force| Estimate::of(py, force)).transpose()?,
+            force: estimate(force)?,
             flags,
             pixel_size,
         })

@@ -34,7 +34,7 @@ mod _native {
     #[pymodule_export]
     use super::errors::TactileError;
     #[pymodule_export]
-    use super::gels::{GelFrame, GelSensor, markers};
+    use super::gels::{GelFollower, GelSensor, markers};
     #[pymodule_export]
     use super::inclusion::{inclusion, inclusion_of_scene};
     #[pymodule_export]
@@ -47,8 +47,9 @@ mod _native {
     use super::press::{Press, Session};
     #[pymodule_export]
     use super::results::{
-        Contact, Estimate, GelContact, GelReport, HertzContact, HiddenLumps, Inclusion, Load, Lump,
-        Markers, Match, Modulus, SimulatedPress, Strain, StrainBetween, StrainGrid, Surface,
+        Contact, Estimate, GelContact, GelFrame, GelReport, HertzContact, HiddenLumps, Inclusion,
+        Load, Lump, Markers, Match, Modulus, SimulatedPress, Strain, StrainBetween, StrainGrid,
+        Surface,
     };
     #[pymodule_export]
     use super::run_program;

@@ -2,8 +2,8 @@
 use crate::arrays::{self, Matrix, Tensors, Vector};
 use crate::errors::{Signals, failed, invalid};
 use nalgebra::{Point, SMatrix, SVector};
-use ndarray::{Array2, ArrayView2};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use ndarray::{Array2, Array3, ArrayView2};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
@@ -222,6 +222,72 @@ result! {
         outline: Matrix<i64>,
         /// Whether the contact is cut by the edge of the frame.
         touches_edge: bool,
+    }
+}
+
+result! {
+    /// The results of one frame of a gel.
+    GelFrame {
+        /// Displacement of the surface into the gel in metres, zero far from contacts.
+        depth: Matrix<f64>,
+        /// ∂depth/∂x along a row and ∂depth/∂y down the rows.
+        gradient: (Matrix<f32>, Matrix<f32>),
+        /// Standard errors of the depth of a pixel and of the common zero level.
+        depth_error: (f64, f64),
+        /// The contact of each pixel, from 1 in the order of `contacts`, and 0 without contact.
+        labels: Matrix<u16>,
+        /// The contacts, with that of the highest pressure first.
+        contacts: Vec<Py<GelContact>>,
+        /// Normal force of all contacts in newtons, for sensors with a layer.
+        force: Option<Py<Estimate>>,
+        /// Forces along x and y in newtons, from the dots of a gel with a layer (`GelSensor.follower`).
+        shear: Option<(Py<Estimate>, Py<Estimate>)>,
+        /// Torque about the axis through the centre of the frame in newton metres, from the dots.
+        torque: Option<Py<Estimate>>,
+        /// Fraction of the dots under the first contact that have slipped since it began.
+        slip: Option<f64>,
+        /// Doubts about the result, one sentence each.
+        flags: Vec<String>,
+        /// Size of a pixel on the gel in metres.
+        pixel_size: f64,
+    }
+
+    /// Unit normals of the surface, (rows, columns, 3). z points to the object.
+    fn normals<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f32>> {
+        let (p, q) = (
+            self.gradient.0.bind(py).readonly(),
+            self.gradient.1.bind(py).readonly(),
+        );
+        let (p, q) = (p.as_array(), q.as_array());
+        let (rows, columns) = p.dim();
+        let mut normals = Array3::zeros((rows, columns, 3));
+        for ((at, p), q) in p.indexed_iter().zip(&q) {
+            // The depth increases away from the object.
+            let length = (1.0 + p * p + q * q).sqrt();
+            for (k, part) in [*p, *q, 1.0].into_iter().enumerate() {
+                normals[[at.0, at.1, k]] = part / length;
+            }
+        }
+        PyArray3::from_owned_array(py, normals)
+    }
+
+    /// The surface as points in metres, (rows × columns, 3): x, y, and z to the object.
+    fn points<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let depth = self.depth.bind(py).readonly();
+        let depth = depth.as_array();
+        let mut points = Array2::zeros((depth.len(), 3));
+        for (mut point, ((row, column), z)) in points.outer_iter_mut().zip(depth.indexed_iter()) {
+            point[0] = column as f64 * self.pixel_size;
+            point[1] = row as f64 * self.pixel_size;
+            point[2] = -z;
+        }
+        PyArray2::from_owned_array(py, points)
+    }
+
+    /// Plots the depth with the outlines of the contacts, as a matplotlib figure.
+    fn plot<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let plots = slf.py().import("tactile_imaging._plot")?;
+        plots.call_method1("plot_gel", (slf,))
     }
 }
 

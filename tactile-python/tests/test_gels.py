@@ -1,5 +1,9 @@
 """Gels lit in colours or darkening, and markers: from arrays."""
 
+import copy
+import json
+import pickle
+
 import numpy as np
 import pytest
 import tactile_imaging as ti
@@ -190,3 +194,42 @@ def test_a_gel_that_darkens_is_calibrated_by_balls_or_a_table(tmp_path):
         by_table.read(lit(np.zeros((ROWS, COLUMNS))))
     with pytest.raises(ti.TactileError, match="the frame is black"):
         by_table.read(np.zeros((ROWS, COLUMNS), np.uint8))
+
+
+def test_sensors_and_frames_are_copied_and_sent(sensor):
+    frame = sensor.read(lit(half_space(110, 70, 18, ball=60), 99))
+    for again in (pickle.loads(pickle.dumps(sensor)), copy.copy(sensor), copy.deepcopy(sensor)):
+        assert again.read(lit(half_space(110, 70, 18, ball=60), 99)) == frame
+    for again in (pickle.loads(pickle.dumps(frame)), copy.deepcopy(frame)):
+        assert again == frame and repr(again) == repr(frame)
+    assert ti.GelFrame.from_dict(frame.to_dict()) == frame
+    assert ti.GelFrame.from_dict(json.loads(json.dumps(frame.to_dict(plain=True)))) == frame
+    with pytest.raises(ti.TactileError, match="no printed dots"):
+        sensor.follower()
+
+
+def dotted(frame, shift=0.0):
+    """Dots of 3 px every 20 px, moved along x."""
+    rows, columns = np.mgrid[:ROWS, :COLUMNS]
+    x, y = (columns - 10 - shift + 10) % 20 - 10, rows % 20 - 10
+    cover = 1 / (1 + np.exp(2 * (np.hypot(x, y) - 3)))
+    return np.round(frame * (1 - 0.8 * cover)[..., None]).astype(np.uint8)
+
+
+def test_a_follower_gives_shear_and_slip():
+    still = dotted(lit(np.zeros((ROWS, COLUMNS))))
+    balls = [dotted(frame) for frame in presses()]
+    sensor = ti.GelSensor.calibrate(still, balls, ball_radius=BALL * PIXEL, pixel_size=PIXEL, layer=(4e-3, 0.48, 1e5, 0.0))
+    assert sensor.has_dots
+    press = lit(half_space(110, 70, 30, ball=100), 99)
+    live = sensor.follower()
+    for shift in (0.0, 1.0, 2.0, 3.0, 4.0):
+        frame = live.read(dotted(press, shift))
+    # 80 cells of a square millimetre move by 0.2 mm on a layer of 4 mm. The lit slopes under a dot move its centre by a twentieth of
+    # a pixel, in common.
+    stiffness = 1e5 / 2 / 1.48 / 4e-3 * 80e-6
+    along, across = (part.value for part in frame.shear)
+    assert abs(along - stiffness * 4 * PIXEL) < stiffness * 0.05 * PIXEL and abs(across) < stiffness * 0.05 * PIXEL
+    assert frame.slip == 0.0 and frame.torque.standard_error > 0
+    assert sensor.read(dotted(press, 4.0)).shear is None
+    assert pickle.loads(pickle.dumps(frame)) == frame

@@ -1,6 +1,8 @@
 """Results as values: dictionaries, tables, copies and numbers."""
 
 import importlib
+import tempfile
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -55,6 +57,20 @@ def reduced(result: Any) -> Any:
     return restored, (type(result), result._text, list(_fields(result).values()))
 
 
+def reduced_gel(sensor: Any) -> Any:
+    with tempfile.TemporaryDirectory() as folder:
+        sensor.save(Path(folder) / "gel.toml")
+        files = {path.name: path.read_bytes() for path in Path(folder).iterdir()}
+    return restored_gel, (type(sensor), files, sensor.order)
+
+
+def restored_gel(cls: Any, files: Any, order: Any) -> Any:
+    with tempfile.TemporaryDirectory() as folder:
+        for name, content in files.items():
+            (Path(folder) / name).write_bytes(content)
+        return cls.load(Path(folder) / "gel.toml", order=order)
+
+
 def restored(cls: Any, text: Any, fields: Any) -> Any:
     for field in fields:
         if isinstance(field, np.ndarray):
@@ -64,7 +80,9 @@ def restored(cls: Any, text: Any, fields: Any) -> Any:
 
 # Fields that are lists or tuples in a result. Other lists are arrays.
 _LISTS = {"flags", "identified", "rotation", "rotation_error", "translation", "translation_error", "counts"}
-_TUPLES = {"interval_95", "pixel_size", "origin"}
+_TUPLES = {"interval_95", "pixel_size", "origin", "depth_error", "shear"}
+# Arrays of other numbers than 64-bit ones.
+_TYPES = {"gradient": np.float32, "labels": np.uint16}
 
 
 def _from_entry(name: Any, value: Any) -> Any:
@@ -73,6 +91,12 @@ def _from_entry(name: Any, value: Any) -> Any:
         return from_dict(importlib.import_module("tactile_imaging").StrainGrid, value)
     if isinstance(value, dict) and set(value) == {"value", "standard_error", "interval_95"}:
         return from_dict(importlib.import_module("tactile_imaging").Estimate, value)
+    if name == "contacts":
+        return [from_dict(importlib.import_module("tactile_imaging").GelContact, contact) for contact in value]
+    if name in _TYPES and value is not None:
+        parts = value if isinstance(value, (list, tuple)) and name == "gradient" else [value]
+        arrays = [np.asarray(part, _TYPES[name]) for part in parts]
+        return tuple(arrays) if name == "gradient" else arrays[0]
     if name in _TUPLES and isinstance(value, (list, tuple)):
         return tuple(_from_entry("", entry) for entry in value)
     if not isinstance(value, list) or name in _LISTS:
