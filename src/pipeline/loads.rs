@@ -120,13 +120,12 @@ impl SeenLoads {
         self.0.iter().map(|(load, _)| *load)
     }
 
-    /// Adds a reliable contact: single, complete, within the calibration, and with a fitted profile.
-    /// A few saturated pixels, such as a hot one, are an error of its force.
+    /// Adds a reliable contact: complete, within the calibration, and with a fitted profile. A few
+    /// saturated pixels are an error of its force. Other contacts beside it are no part of it.
     pub(super) fn learn(&mut self, contact: &ContactReading, mean_strain: Option<Estimate>) {
-        let whole = !contact.touches_edge && contact.other_contacts == 0;
         // A flat face is measured without a fit of the profile.
         let read = contact.converged || contact.face.is_some();
-        let trusted = whole && !contact.out_of_calibration && read;
+        let trusted = !contact.touches_edge && !contact.out_of_calibration && read;
         let load = Load::of(contact).filter(|load| trusted && load.force_n.value > 0.0);
         let Some(load) = load else { return };
         // Noise separates two frames of one load, so equal contacts come from the same image.

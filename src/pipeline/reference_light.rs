@@ -18,6 +18,16 @@ const BOTH: f64 = 0.04;
 /// A factor with a larger error than this corrects nothing.
 const LARGEST_ERROR: f64 = 5e-3;
 
+/// Share of the squared change from which a pattern of rows is bands of light.
+const LEAST_OF_BANDS: f64 = 0.5;
+
+/// Largest share of a parabola in bands.
+const PARABOLA_OF_BANDS: f64 = 0.1;
+
+/// Scatters above the rest from which a block glows, and the most blocks that glow: one in so many.
+const GLOW: f64 = 5.0;
+const MOST_OF_GLOW: usize = 4;
+
 /// Brightness of a reference in 8 × 8 blocks, stored with a calibration. Lamps and exposure change
 /// the background and the leaked light by one factor, so a later reference reveals the error of the
 /// forces. Room light and the black level only add to the background. An uneven background
@@ -92,9 +102,12 @@ impl ReferenceLight {
         }
         let noise = now.error_grey.hypot(self.error_grey);
         // Clipped blocks have lost the light that they would be compared by.
+        let mut now = now;
+        without_bands(&self.grey, &mut now.grey);
         let both = self.grey.iter().copied().zip(now.grey.iter().copied());
         let usable = |(then, now): &(f64, f64)| *then > CLIPPED_GREY && *now > CLIPPED_GREY;
-        let blocks: Vec<(f64, f64)> = both.filter(usable).collect();
+        let mut blocks: Vec<(f64, f64)> = both.filter(usable).collect();
+        let glow = without_glow(&mut blocks, noise);
         let count = blocks.len() as f64;
         let sum = |f: &dyn Fn(f64, f64) -> f64| -> f64 {
             blocks.iter().map(|&(then, now)| f(then, now)).sum()
@@ -125,15 +138,16 @@ impl ReferenceLight {
             true => (left / (count - 2.0)).max(noise * noise).sqrt() / structure.sqrt() / gain,
             false => f64::INFINITY,
         };
-        let seen = (ratio - 1.0).abs() > 0.01 + 5.0 * error
+        let changed = (ratio - 1.0).abs() > 0.01 + 5.0 * error
             || alone > 0.01
             || is_structured && gain.ln().abs() > 0.01 + 5.0 * by_structure;
-        if !seen {
+        let seen = changed || glow > 0.01;
+        if !changed {
             let of_change = 0.1 * (ratio - 1.0);
             return Some(LightChange {
                 gain: Estimate::new(ratio, error.hypot(alone).hypot(of_change)),
                 stray_grey: 0.0,
-                uneven: alone,
+                uneven: alone.hypot(glow),
                 seen,
             });
         }
@@ -153,6 +167,81 @@ impl ReferenceLight {
             seen,
         })
     }
+}
+
+/// The factor between blocks then and now, by least squares.
+fn ratio_of(blocks: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
+    let products = blocks.clone().map(|(then, now)| then * now).sum::<f64>();
+    products / blocks.map(|(then, _)| then * then).sum::<f64>()
+}
+
+/// Removes a pattern of rows from the present light, such as the bands of lamps on mains: the means
+/// of the rows without their parabola, which lamps have too, if they are most of the change.
+fn without_bands(then: &[f64], now: &mut [f64]) {
+    let ratio = ratio_of(then.iter().copied().zip(now.iter().copied()));
+    let left: Vec<f64> = (then.iter().zip(&*now))
+        .map(|(then, now)| now - ratio * then)
+        .collect();
+    let rows = left.chunks(BLOCKS);
+    let mut bands: Vec<f64> = rows
+        .map(|row| row.iter().sum::<f64>() / BLOCKS as f64)
+        .collect();
+    let mut means = bands.clone();
+    let middle = 0.5 * (BLOCKS as f64 - 1.0);
+    let mean_square = middle * (middle + 1.0) / 3.0;
+    let polynomials: [fn(f64, f64) -> f64; 3] =
+        [|_, _| 1.0, |y, _| y, |y, mean_square| y * y - mean_square];
+    for polynomial in polynomials {
+        let at = |row: usize| polynomial(row as f64 - middle, mean_square);
+        let squares: f64 = (0..BLOCKS).map(|row| at(row).powi(2)).sum();
+        let product: f64 = bands.iter().enumerate().map(|(row, b)| b * at(row)).sum();
+        for (row, band) in bands.iter_mut().enumerate() {
+            *band -= product / squares * at(row);
+        }
+    }
+    let squares = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
+    let of_bands = BLOCKS as f64 * squares(&bands);
+    // Bands have a parabola, too, because a frame cuts them. A larger one is that of a lamp.
+    let mean = means.iter().sum::<f64>() / BLOCKS as f64;
+    means.iter_mut().for_each(|row| *row -= mean);
+    if squares(&means) < (1.0 + PARABOLA_OF_BANDS) * squares(&bands) {
+        bands = means;
+    }
+    if of_bands > LEAST_OF_BANDS * left.iter().map(|l| l * l).sum::<f64>() {
+        let rows = now.chunks_mut(BLOCKS).zip(&bands);
+        rows.for_each(|(row, band)| row.iter_mut().for_each(|now| *now -= band));
+    }
+}
+
+/// Removes the blocks of a scratch or a spot that glows: few, and much brighter than the rest. Returns
+/// their root mean square change relative to the light, over all blocks: an object that rests on the
+/// sensor glows too.
+fn without_glow(blocks: &mut Vec<(f64, f64)>, noise: f64) -> f64 {
+    let most = blocks.len() / MOST_OF_GLOW;
+    let mut kept = blocks.clone();
+    for _ in 0..3 {
+        let mut ratios: Vec<f64> = kept.iter().map(|(then, now)| now / then).collect();
+        if ratios.is_empty() {
+            return 0.0;
+        }
+        ratios.sort_unstable_by(f64::total_cmp);
+        let middle = ratios[ratios.len() / 2];
+        let left = |&(then, now): &(f64, f64)| now - middle * then;
+        let mut sizes: Vec<f64> = kept.iter().map(|block| left(block).abs()).collect();
+        sizes.sort_unstable_by(f64::total_cmp);
+        let limit = GLOW * (1.4826 * sizes[sizes.len() / 2]).max(noise);
+        kept.retain(|block| left(block) <= limit);
+    }
+    if kept.len() == blocks.len() || blocks.len() - kept.len() > most {
+        return 0.0;
+    }
+    let ratio = ratio_of(kept.iter().copied());
+    let change = blocks
+        .iter()
+        .map(|(then, now)| (now / then - ratio).powi(2));
+    let uneven = (change.sum::<f64>() / blocks.len() as f64).sqrt();
+    *blocks = kept;
+    uneven
 }
 
 /// The change of the light since the calibration.
@@ -184,5 +273,43 @@ impl LightChange {
             stray_grey: self.stray_grey,
             uneven: self.uneven,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array2;
+
+    /// Frame of 128 × 128 pixels with light that rises to one side.
+    fn frame(light: impl Fn(f64, f64) -> f64) -> ReferenceFrame {
+        let grey = |(y, x): (usize, usize)| {
+            let (y, x) = (y as f64, x as f64);
+            // Positions scattered evenly stand for noise, which the rounding needs.
+            let noise = (37.0 * y + x) * 0.754_877_666_2 % 1.0 - 0.5;
+            (20.0 + x / 8.0 + noise + light(y, x)).round() as u8
+        };
+        ReferenceFrame::new(Array2::from_shape_fn((128, 128), grey).view()).unwrap()
+    }
+
+    #[test]
+    fn bands_and_a_scratch_are_no_change_of_the_lamps() {
+        let light = ReferenceLight::of(&frame(|_, _| 0.0));
+        let bands = |y: f64, _: f64| 2.0 * (y / 5.0).sin();
+        let scratch = |y: f64, x: f64| 15.0 * f64::from(u8::from((y - 0.4 * x - 20.0).abs() < 1.0));
+        let half = |y: f64, _: f64| if y < 64.0 { 1.0 } else { -1.0 };
+        let found = [
+            light.changed(&frame(bands)),
+            light.changed(&frame(scratch)),
+            light.changed(&frame(half)),
+        ];
+        let found = found.map(|change| change.expect("enough light"));
+        // Gains are known to the rounding of the blocks. A scratch is named, because an object that
+        // rests on the sensor glows too. Half of the frame that is brighter is a lamp.
+        for change in &found[..2] {
+            assert!((change.gain.value - 1.0).abs() < 3e-3, "{change:?}");
+            assert!(change.gain.standard_error < 4e-3, "{change:?}");
+        }
+        assert_eq!(found.map(|change| change.seen), [false, true, true]);
     }
 }

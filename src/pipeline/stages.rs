@@ -125,10 +125,20 @@ impl Stages {
                     Some(_) => self.of_light(error(Source::Coupling)),
                     None => Uncertain::exact(1.0),
                 };
+                // A line from sums is calibrated in the middle of the frame.
+                let unseen = reading.force_n.is_some()
+                    && self.contact.reads_light()
+                    && settings.checked_gain.is_none();
+                let centre = reading.centroid_px.map(|centroid| centroid.value);
+                let vignetting = match unseen {
+                    true => self.reference.vignetting_at(centre),
+                    false => 0.0,
+                };
                 // Above its saturation level a Hertz profile has less than this fraction of its
                 // force.
                 let factor = factor
                     .by_relative(Source::Gain, error(Source::Gain))
+                    .by_relative(Source::Gain, vignetting)
                     .by_relative(Source::Gain, reading.saturated_share);
                 let force = reading.force_n.or_else(|| gauge.map(Uncertain::from));
                 reading.force_n = force.map(|force| force * factor);

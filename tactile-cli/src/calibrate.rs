@@ -14,10 +14,11 @@ use tactile_files::sensor::{
     CalibratedSensor, GelPresses, Indenter, LayerFinding, PressFinding, SensorCalibration,
     SensorError,
 };
+use tactile_imaging::core::Source;
 use tactile_imaging::force::{
     Branch, CalibrationPair, LinearCalibration, LocalCalibration, StressCalibration,
 };
-use tactile_imaging::pipeline::Flag;
+use tactile_imaging::pipeline::{Assumptions, Flag};
 
 /// Calibrate a sensor from frames of presses, or fit the line from pixel value to force
 ///
@@ -297,18 +298,91 @@ fn print_sensor(found: &CalibratedSensor, context: &mut Context) {
         let [name, says] = layer_words(finding);
         context.line(format_args!("{name:<24} {says}"));
     }
+    let accuracy = Accuracy::of(found);
+    let [bare, force, soft, modulus] = [
+        accuracy.force(accuracy.coupling),
+        accuracy.force(0.0),
+        accuracy.modulus(accuracy.coupling),
+        accuracy.modulus(0.0),
+    ]
+    .map(|share| digits(100.0 * share, 2));
+    context.line("standard errors with this calibration:");
+    context.row(
+        "under a skin",
+        format_args!("force {force} %, modulus of a ball as stiff as the guide {modulus} %"),
+    );
+    context.row(
+        "bare guide",
+        format_args!("force {bare} %, modulus {soft} %; a [[check]] press replaces the coupling"),
+    );
+    context.line("presses, with the sum of grey levels above the reference:");
+    for (k, press) in found.presses.iter().enumerate() {
+        let (Some(value), Some(read)) = (press.integrated_pixel_value, press.read_force_n) else {
+            continue;
+        };
+        let [value, gauge] = [value, press.force_n].map(four_digits);
+        let off = digits(100.0 * (read.value / press.force_n - 1.0), 2);
+        let text = format!("{gauge} N, {value} grey levels, {off} % by the curve");
+        context.row(&format!("press {}", k + 1), text);
+    }
+}
+
+/// Relative standard errors of later measurements.
+struct Accuracy {
+    /// Of the curve under the largest press, and of the gauge.
+    curve: f64,
+    /// Of lengths.
+    length: f64,
+    /// Of the layers' moduli.
+    guide: f64,
+    /// Of the light that another object couples on a bare guide.
+    coupling: f64,
+}
+
+impl Accuracy {
+    fn of(found: &CalibratedSensor) -> Self {
+        let sensor = &found.sensor;
+        let read = found.presses.iter().filter_map(|p| p.read_force_n);
+        let largest = read.max_by(|a, b| a.value.total_cmp(&b.value));
+        let of_layers = sensor.layer_covariance.iter().enumerate();
+        let of_layers = of_layers.take(sensor.layers.len()).map(|(k, row)| row[k]);
+        let assumptions = Assumptions::default();
+        Self {
+            curve: largest
+                .map_or(0.0, |force| force.relative_error())
+                .hypot(sensor.gauge_error),
+            length: sensor.geometry.length_scale_error(),
+            guide: of_layers.fold(0.0, f64::max).sqrt(),
+            coupling: (sensor.coupling_error)
+                .unwrap_or_else(|| assumptions.error(Source::Coupling)),
+        }
+    }
+
+    fn force(&self, coupling: f64) -> f64 {
+        self.curve.hypot(coupling)
+    }
+
+    /// For a ball as stiff as the guide, E* = F R / (4/3 a³) contains its compliance and that of the
+    /// guide in equal parts, so that the error of E* counts twice and that of the guide once.
+    fn modulus(&self, coupling: f64) -> f64 {
+        let of_both = self.force(coupling).hypot(3.0 * self.length);
+        (2.0 * of_both).hypot(self.guide)
+    }
 }
 
 fn sensor_value(found: &CalibratedSensor) -> Result<Value, Failure> {
     let press = |p: &PressFinding| {
         let (shape, radius_m) = match p.indenter {
-            Indenter::Ball { radius_m, .. } => ("ball", radius_m),
-            Indenter::Punch { radius_m } => ("punch", radius_m),
+            Indenter::Ball { radius_m, .. } => ("ball", Some(radius_m)),
+            Indenter::Punch { radius_m } => ("punch", Some(radius_m)),
+            Indenter::Body => ("body", None),
         };
         let branch = BRANCHES.iter().find(|b| b.0 == p.branch).map(|b| b.2);
         json!({
             "indenter": shape, "radius_m": radius_m, "branch": branch, "force_n": p.force_n,
-            "read_force_n": p.read_force_n, "contact_radius_m": p.contact_radius_m,
+            "integrated_pixel_value": p.integrated_pixel_value,
+            "read_force_n": p.read_force_n.map(|read| read.value),
+            "contact_radius_m": p.contact_radius_m,
             "layers_force_n": p.layers_force_n,
         })
     };
@@ -383,7 +457,7 @@ fn with_presses(
 fn residual_panel(found: &CalibratedSensor) -> Panel {
     let error = |press: &PressFinding| {
         let read = press.read_force_n.filter(|_| press.force_n > 0.0)?;
-        Some([press.force_n, 100.0 * (read / press.force_n - 1.0)])
+        Some([press.force_n, 100.0 * (read.value / press.force_n - 1.0)])
     };
     let largest = found.presses.iter().map(|p| p.force_n).fold(0.0, f64::max);
     let title = "Force by the curve against the gauge";

@@ -127,10 +127,16 @@ impl Context {
     /// A caution if nothing shows that the lamps are those of the calibration.
     pub(crate) fn warn_of_light(&mut self, scene: &Scene) {
         if scene.takes_light_as_unchanged() {
-            let sentence = "forces assume the lamps of the calibration: state its frame without \
-                            contact (reference under [calibration]), or add a [[check]]";
-            self.warn("calibration_light_unknown", Value::Null, sentence);
+            self.warn_of_unknown_light("reference under [calibration]), or add a [[check]]");
         }
+    }
+
+    /// Warns that the light of the calibration is unknown; `how` to state it.
+    pub(crate) fn warn_of_unknown_light(&mut self, how: &str) {
+        let sentence = format!(
+            "forces assume the lamps of the calibration: state its frame without contact ({how}"
+        );
+        self.warn("calibration_light_unknown", Value::Null, sentence);
     }
 
     /// The cautions about a frame, one per line, below the name of the frame.

@@ -99,6 +99,9 @@ pub(crate) fn run(arguments: &ForceArguments, context: &mut Context) -> Result<E
             let NamedFrame { name, pixels, .. } = frame.named();
             if let Some(line) = heading.take() {
                 line.print(context);
+                if pairs_reference.is_none() {
+                    context.warn_of_unknown_light("--pairs-reference)");
+                }
                 context.warn_of_frame(&session.standing_cautions());
             }
             let found = session.push(pixels.view());

@@ -259,7 +259,7 @@ impl ContactDetector {
         let saturated = if self.options.polarity.sign() > 0 && statistics.saturated == 0 {
             0
         } else {
-            self.saturated(&workspace.region, frame, extent.area)?
+            self.saturated(&workspace.region, frame, reference, extent.area)?
         };
         let contact = summarise(
             &workspace.region,
@@ -287,7 +287,15 @@ impl ContactDetector {
     ) -> IlluminationDrift {
         match reference.tile_sums(&workspace.pass.tiles) {
             Some(tiles) if self.options.drift != DriftCorrection::None => {
-                drift::fit(self.options.drift, size, tiles, sd, &mut workspace.drift)
+                let sign = f64::from(self.options.polarity.sign());
+                drift::fit(
+                    self.options.drift,
+                    size,
+                    tiles,
+                    sd,
+                    sign,
+                    &mut workspace.drift,
+                )
             }
             _ => IlluminationDrift::default(),
         }
@@ -362,9 +370,11 @@ impl ContactDetector {
         &self,
         region: &Region,
         frame: ArrayView2<'_, u8>,
+        reference: &ReferenceFrame,
         area: usize,
     ) -> Result<usize, ForceError> {
-        let frame = region.place.map_or(frame, |place| place.of(frame));
+        let place = region.place.unwrap_or(BoundingBox::whole(frame.dim()));
+        let frame = place.of(frame);
         let full = if self.options.polarity.sign() > 0 {
             u8::MAX
         } else {
@@ -375,7 +385,13 @@ impl ContactDetector {
             let row = row.slice_axis(Axis(0), Slice::from(run.start as usize..run.end as usize));
             row.iter().filter(|p| **p == full).count()
         };
-        let saturated = region.mask.iter().map(in_run).sum();
+        let saturated: usize = region.mask.iter().map(in_run).sum();
+        // Hot and dead pixels were replaced by their neighbours.
+        let defects = reference.defects_in(place).filter(|&(row, column)| {
+            let at = (row - place.row_start, column - place.column_start);
+            frame[at] == full && region.pixels[at.0 * place.columns() + at.1] == 1
+        });
+        let saturated = saturated - defects.count().min(saturated);
         let (share, limit) = (
             saturated as f64 / area as f64,
             self.options.saturation_limit,
@@ -502,9 +518,6 @@ fn scatter(
     drift: &IlluminationDrift,
     sizes: &mut Vec<f64>,
 ) -> f64 {
-    // Half of a normal variable's absolute values are below 0.6745 standard deviations, a third
-    // below 0.4307.
-    const THIRD: f64 = 0.4307;
     // Fewer tiles determine the third to a quarter of itself, with four standard errors to itself.
     const FEWEST: usize = 32;
     let Some(sums) = reference.tile_sums(tiles) else {
@@ -518,7 +531,7 @@ fn scatter(
     let (third, count) = (sizes.len() / 3, sizes.len() as f64);
     let (_, size, _) = sizes.select_nth_unstable_by(third, f64::total_cmp);
     let by_chance = 1.0 + 4.0 * 1.3 / count.sqrt();
-    *size / THIRD / by_chance
+    *size / drift::THIRD / by_chance
 }
 
 /// The z with P(N > z) = rate / trials for a standard normal N: among `trials` values, the

@@ -5,6 +5,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::tiles::{TILE_COLUMNS, TILE_ROWS, TileSum};
 
+/// A third of a normal variable's absolute values is below this number of standard deviations.
+pub(crate) const THIRD: f64 = 0.4307;
+
 /// Minimum grey level of a usable reference.
 const LEAST_REFERENCE_GREY: f64 = 1e-3;
 
@@ -261,7 +264,7 @@ impl IlluminationDrift {
         if !known {
             return refused(DriftOutcome::TooDark { standard_error });
         }
-        // The median from which the fit starts is background only if most tiles are.
+        // With less background another illumination may agree as well.
         if share < 0.5 {
             return refused(DriftOutcome::TooLittleBackground { share });
         }
@@ -406,12 +409,14 @@ pub(crate) struct FitWorkspace {
 }
 
 /// Fits the correction by least squares to all tiles except outliers (the contact), repeated until
-/// the number of tiles settles. `sd` is the noise of one pixel's difference.
+/// the number of tiles settles. `sd` is the noise of one pixel's difference, `sign` that of a
+/// contact.
 pub(crate) fn fit(
     correction: DriftCorrection,
     (rows, columns): (usize, usize),
     given: impl Iterator<Item = TileSum>,
     sd: f64,
+    sign: f64,
     workspace: &mut FitWorkspace,
 ) -> IlluminationDrift {
     let FitWorkspace {
@@ -429,16 +434,18 @@ pub(crate) fn fit(
     let automatic = correction == DriftCorrection::Automatic;
     values.clear();
     values.extend(tiles.iter().map(|tile| drift.residual(tile) / weight(tile)));
-    // A contact that covers less than half of the tiles shifts the median only slightly.
-    drift.coefficients[0] += median(values, scratch);
+    // A contact changes tiles to one side. The third on the other side is background even if a
+    // contact covers more than half of a small frame.
+    values.iter_mut().for_each(|value| *value *= sign);
+    drift.coefficients[0] += sign * quantile(values, 3, scratch);
     let noise = sd / ((TILE_ROWS * TILE_COLUMNS) as f64).sqrt();
     for _ in 0..20 {
         values.clear();
         let level = |tile: &TileSum| (drift.residual(tile) / tile.pixels).abs();
         values.extend(tiles.iter().map(level));
-        // Scatter about the median, which tiles of the contact hardly widen, but at least the
-        // noise.
-        let limit = 3.0 * (1.4826 * median(values, scratch)).max(noise);
+        // Scatter of the third that is nearest, which tiles of the contact hardly widen, but at least
+        // the noise.
+        let limit = 3.0 * (quantile(values, 3, scratch) / THIRD).max(noise);
         let before = drift.tiles;
         drift.tiles = match automatic {
             true => drift.step_both(tiles, limit, sd, limit / (3.0 * noise)),
@@ -456,14 +463,15 @@ pub(crate) fn fit(
     drift
 }
 
-/// The upper median, by [`f64::total_cmp`] (0 if there are no values). `scratch` is overwritten. A
-/// sample brackets the median, so that most values are only counted. The result does not depend on
+/// The value below which one in `parts` lies, by [`f64::total_cmp`] (0 if there are no values): for
+/// two the upper median. `scratch` is overwritten. A
+/// sample brackets it, so that most values are only counted. The result does not depend on
 /// the sample: if the bracket misses, all values are examined.
-pub(crate) fn median(values: &[f64], scratch: &mut Vec<f64>) -> f64 {
+fn quantile(values: &[f64], parts: usize, scratch: &mut Vec<f64>) -> f64 {
     if values.is_empty() {
         return 0.0;
     }
-    let middle = values.len() / 2;
+    let middle = values.len() / parts;
     scratch.clear();
     // One in 32 values is sampled first. For the quarter of a frame's 5 700 tiles, collecting the
     // values would cost more than sorting them saves.
@@ -471,7 +479,7 @@ pub(crate) fn median(values: &[f64], scratch: &mut Vec<f64>) -> f64 {
     scratch.sort_unstable_by(f64::total_cmp);
     // Three standard deviations of a rank in the sample, each ½√n.
     let reach = (1.5 * (scratch.len() as f64).sqrt()).ceil() as usize;
-    let centre = scratch.len() / 2;
+    let centre = scratch.len() / parts;
     let low = scratch[centre.saturating_sub(reach)];
     let high = scratch[(centre + reach).min(scratch.len() - 1)];
     if low <= high {
@@ -504,21 +512,22 @@ mod tests {
 
     proptest! {
         #[test]
-        fn is_the_middle_of_the_sorted_values(
+        fn is_one_of_the_sorted_values(
             mut values in proptest::collection::vec(prop_oneof![
                 8 => -1.0..1.0_f64,
                 2 => Just(0.0), 1 => Just(-0.0), 1 => Just(f64::INFINITY),
             ], 0..400),
             nan in proptest::option::of(0_usize..400), period in 1_usize..40,
+            parts in 2_usize..4,
         ) {
             // A sample at equal steps misses everything between them.
             values.iter_mut().step_by(period).for_each(|v| *v += 10.0);
             if let Some(value) = nan.and_then(|at| values.get_mut(at)) {
                 *value = -f64::NAN;
             }
-            let found = median(&values, &mut vec![3.0]);
+            let found = quantile(&values, parts, &mut vec![3.0]);
             values.sort_by(f64::total_cmp);
-            let expected = values.get(values.len() / 2).copied().unwrap_or(0.0);
+            let expected = values.get(values.len() / parts).copied().unwrap_or(0.0);
             prop_assert_eq!(found.to_bits(), expected.to_bits());
         }
     }

@@ -84,6 +84,14 @@ impl FlatField {
             .sum()
     }
 
+    /// The change over the squared distance from the middle, and the middle: the smaller of the
+    /// curvatures along x and y. `None` if they differ in sign.
+    pub(crate) fn by_distance(&self) -> Option<(f64, [f64; 2])> {
+        let [u, v] = [(3, 0), (5, 1)]
+            .map(|(term, axis)| self.coefficients[term] / self.middle[axis].max(1.0).powi(2));
+        (u * v > 0.0).then(|| (u.abs().min(v.abs()), self.middle))
+    }
+
     pub(crate) fn line(&self, row: usize, first_column: usize) -> FlatLine {
         let (x, y, wide) = (first_column as f64, row as f64, self.middle[0].max(1.0));
         let bend = self.coefficients[3] / (wide * wide);

@@ -54,6 +54,55 @@ pub struct ReferenceFrame {
     tiles: Tiles,
     /// Positions, pixels and sums of all tiles, used for frames equal to the reference.
     blank: Vec<TileSum>,
+    /// Row and column of the pixels that are hot or dead, in ascending order.
+    defects: Vec<(usize, usize)>,
+    /// Relative change of the light over the squared distance from the middle of the frame.
+    vignetting: Option<(f64, [f64; 2])>,
+}
+
+/// A pixel is hot or dead if it differs from all but one of its neighbours by this number of
+/// standard deviations and of grey levels.
+const DEFECT_SD: f64 = 10.0;
+const DEFECT_GREY: f64 = 10.0;
+
+/// Largest share of defects. More of them are a texture of the sensor.
+const MOST_DEFECTS: f64 = 1e-3;
+
+/// The hot and dead pixels of an image in standard layout.
+fn defects_of(image: &Array2<u8>, sd: f64) -> Vec<(usize, usize)> {
+    let (rows, columns) = image.dim();
+    let limit = (DEFECT_SD * sd).clamp(DEFECT_GREY, 255.0) as i16;
+    let pixels = image.as_slice().unwrap_or_default();
+    let most = (MOST_DEFECTS * pixels.len() as f64) as usize;
+    let mut found = Vec::new();
+    for (row, line) in pixels.chunks(columns).enumerate() {
+        // Most pixels are near one neighbour, which decides quickly.
+        let far = |a: u8, b: u8| i16::from(a).abs_diff(i16::from(b)) > limit.unsigned_abs();
+        for column in 1..columns {
+            if !far(line[column], line[column - 1]) {
+                continue;
+            }
+            for column in [column - 1, column] {
+                let beside = [
+                    row.checked_sub(1).map(|r| (r, column)),
+                    (row + 1 < rows).then_some((row + 1, column)),
+                    column.checked_sub(1).map(|c| (row, c)),
+                    (column + 1 < columns).then_some((row, column + 1)),
+                ];
+                let near = beside
+                    .into_iter()
+                    .flatten()
+                    .filter(|&(r, c)| !far(line[column], pixels[r * columns + c]));
+                if near.count() <= 1 && found.last() != Some(&(row, column)) {
+                    found.push((row, column));
+                }
+            }
+        }
+        if found.len() > most {
+            return Vec::new();
+        }
+    }
+    found
 }
 
 /// Buffers of the pass.
@@ -105,8 +154,8 @@ impl ReferenceFrame {
             sum_means(mean.view(), &mut tiles);
         }
         let blank = (0..tiles.sums.len()).map(|k| tiles.blank(k, size));
-        Ok(Self {
-            image,
+        let mean_grey = sum as f64 / image.len() as f64;
+        let mut reference = Self {
             mean,
             frames: frames.len(),
             noise,
@@ -114,7 +163,19 @@ impl ReferenceFrame {
             sum,
             blank: blank.collect(),
             tiles,
-        })
+            defects: defects_of(&image, noise.variance(mean_grey).sqrt()),
+            vignetting: None,
+            image,
+        };
+        reference.vignetting = reference.fitted().and_then(|flat| flat.by_distance());
+        Ok(reference)
+    }
+
+    /// The quadratic through the brightness. `None` for a reference that is too dark.
+    fn fitted(&self) -> Option<FlatField> {
+        let tiles = (0..self.tiles.sums.len()).map(|k| self.tile_sum(&self.tiles, k));
+        let flat = FlatField::fit(self.image.dim(), tiles, self.own_variance());
+        flat.filter(|_| self.mean_grey() >= 1.0)
     }
 
     /// Corrects all differences for vignetting: divides them by the local brightness of the
@@ -143,14 +204,36 @@ impl ReferenceFrame {
             mean,
             required: 1.0,
         };
-        let flat = FlatField::fit(
-            self.image.dim(),
-            (0..self.tiles.sums.len()).map(|k| self.tile_sum(&self.tiles, k)),
-            self.own_variance(),
-        )
-        .filter(|_| mean >= 1.0);
-        self.flat = Some(flat.ok_or(too_dark)?);
+        self.flat = Some(self.fitted().ok_or(too_dark)?);
+        self.vignetting = None;
         Ok(self)
+    }
+
+    /// How far the light at a place differs from that in the middle of the frame because of the
+    /// distance, as vignetting does: relative, from a quadratic through the reference. Zero with a
+    /// [flat field](Self::with_flat_field), which corrects it, and if the light falls along one
+    /// direction and rises along the other, which no lens does. O(tiles).
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_force::ReferenceFrame;
+    ///
+    /// // A tenth less light at 50 pixels from the middle.
+    /// let image = Array2::from_shape_fn((81, 101), |(y, x)| {
+    ///     let [x, y] = [x as f64 - 50.0, y as f64 - 40.0];
+    ///     (200.0 * (1.0 - 0.1 * (x * x + y * y) / 2500.0)) as u8
+    /// });
+    /// let reference = ReferenceFrame::new(image.view())?;
+    /// let far = reference.vignetting_at([80.0, 40.0]);
+    /// assert!((far - 0.1 * 0.36).abs() < 2e-3);
+    /// assert_eq!(reference.vignetting_at([50.0, 40.0]), 0.0);
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
+    #[must_use]
+    pub fn vignetting_at(&self, [x, y]: [f64; 2]) -> f64 {
+        self.vignetting.map_or(0.0, |(per_square_px, middle)| {
+            per_square_px * ((x - middle[0]).powi(2) + (y - middle[1]).powi(2))
+        })
     }
 
     /// The correction for vignetting. `None` if it was not requested.
@@ -379,6 +462,17 @@ impl ReferenceFrame {
             saturated,
             bounding_box,
         }
+    }
+
+    /// Row and column of the hot and dead pixels in a box. O(defects).
+    pub(crate) fn defects_in(
+        &self,
+        place: BoundingBox,
+    ) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let rows = place.row_start..place.row_end;
+        let columns = place.column_start..place.column_end;
+        let defects = self.defects.iter().copied();
+        defects.filter(move |(r, c)| rows.contains(r) && columns.contains(c))
     }
 
     /// The image before rounding.

@@ -67,9 +67,32 @@ impl Region {
             (drift, flat.map(|flat| flat.line(row, first_column)))
         };
         let (frame, differences) = (place.of(frame), &mut self.difference);
-        match reference.levels() {
+        let greatest = match reference.levels() {
             Levels::Whole(levels) => take(frame, place.of(levels), lines, sign, differences),
             Levels::Fine(levels) => take(frame, place.of(levels), lines, sign, differences),
+        };
+        self.mend(reference, place);
+        greatest
+    }
+
+    /// Gives hot and dead pixels the mean of their neighbours.
+    fn mend(&mut self, reference: &ReferenceFrame, place: BoundingBox) {
+        let (rows, columns) = (place.rows(), place.columns());
+        for (row, column) in reference.defects_in(place) {
+            let (y, x) = (row - place.row_start, column - place.column_start);
+            let beside = [
+                y.checked_sub(1).map(|y| (y, x)),
+                (y + 1 < rows).then_some((y + 1, x)),
+                x.checked_sub(1).map(|x| (y, x)),
+                (x + 1 < columns).then_some((y, x + 1)),
+            ];
+            let sum = beside
+                .into_iter()
+                .flatten()
+                .fold((0.0, 0.0), |sum, (y, x)| {
+                    (sum.0 + self.difference[y * columns + x], sum.1 + 1.0)
+                });
+            self.difference[y * columns + x] = sum.0 / f32::max(sum.1, 1.0);
         }
     }
 

@@ -105,11 +105,12 @@ pub enum SensorError {
 ///     indenter: Indenter::Punch { radius_m: 2e-3 },
 ///     branch: Branch::Loading,
 ///     force_n: 0.5,
-///     read_force_n: Some(0.503),
+///     integrated_pixel_value: Some(1.2e6),
+///     read_force_n: Some(Estimate::new(0.503, 1e-3)),
 ///     contact_radius_m: Some(Estimate::new(2.01e-3, 2e-6)),
 ///     layers_force_n: None,
 /// };
-/// assert!(finding.read_force_n.is_some_and(|read| (read / finding.force_n - 1.0).abs() < 0.01));
+/// assert!(finding.read_force_n.is_some_and(|read| (read.value / finding.force_n - 1.0).abs() < 0.01));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PressFinding {
@@ -119,9 +120,11 @@ pub struct PressFinding {
     pub branch: Branch,
     /// The gauge's force in newtons.
     pub force_n: f64,
-    /// The force read from the frame with the fitted curve. `None` if no contact is seen; the press
-    /// is then not used.
-    pub read_force_n: Option<f64>,
+    /// Grey levels above the reference, summed over the contact. `None` if no contact is seen; the
+    /// press is then not used.
+    pub integrated_pixel_value: Option<f64>,
+    /// The force read from the frame with the fitted curve.
+    pub read_force_n: Option<Estimate>,
     /// The fitted contact radius. `None` if no contact is seen.
     pub contact_radius_m: Option<Estimate>,
     /// The force that the fitted layers predict at this radius. `None` if the press was not used

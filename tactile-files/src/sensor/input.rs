@@ -30,6 +30,8 @@ pub enum Indenter {
         /// Radius in metres.
         radius_m: f64,
     },
+    /// Any one body. Only the curve is fitted to it.
+    Body,
 }
 
 /// A layer with the manufacturer's values and their standard errors, from which a calibration
@@ -156,8 +158,8 @@ impl SensorCalibration {
     /// [[presses]]
     /// image = "press_01.png"
     /// force_N = 0.1
-    /// branch = "loading"                  # or "unloading"
-    /// # or indenter = { shape = "punch", radius_m = 2e-3 }
+    /// branch = "loading"                  # the default, or "unloading"
+    /// # or indenter = { shape = "punch", radius_m = 2e-3 }, or none for any one body
     /// indenter = { shape = "ball", radius_m = 4e-3, radius_error_m = 5e-6 }
     ///
     /// [[layers]]                          # from the object's side to the glass
@@ -227,9 +229,14 @@ struct PressTable {
     image: PathBuf,
     #[serde(rename = "force_N", deserialize_with = "not_negative")]
     force_n: f64,
-    #[serde(deserialize_with = "BranchName::deserialize")]
+    #[serde(default = "loading", deserialize_with = "BranchName::deserialize")]
     branch: Branch,
-    indenter: IndenterTable,
+    indenter: Option<IndenterTable>,
+}
+
+/// The branch if none is stated.
+fn loading() -> Branch {
+    Branch::Loading
 }
 
 #[derive(Deserialize)]
@@ -299,7 +306,7 @@ impl CalibrationFile {
                 frame,
                 force_n: table.force_n,
                 branch: table.branch,
-                indenter: table.indenter.indenter(),
+                indenter: (table.indenter.as_ref()).map_or(Indenter::Body, IndenterTable::indenter),
             });
         }
         let target = match &self.target {
