@@ -152,12 +152,16 @@ def test_a_lump_is_found():
 
 
 def test_a_lump_between_presses_has_its_place():
-    found = ti.inclusion_of_scene(DATA / "inclusion" / "scan.toml")
+    found = ti.inclusion_of_scene(DATA / "inclusion" / "scan.toml", hidden=4)
     (lump,) = found.lumps
     # The lump of the example scan lies at (8, 4) mm.
     for place, truth in ((lump.x, 8e-3), (lump.y, 4e-3)):
         low, high = place.interval_95
         assert low < truth < high
+    # The program prints this position with one decimal of a millimetre (docs/inclusion.md).
+    hidden = found.hidden
+    assert hidden.next_position == pytest.approx((-12.0e-3, -10.5e-3), abs=0.05e-3)
+    assert hidden.diameters.shape == (len(hidden.depths), len(hidden.positions))
 
 
 def session_answer(pipeline, scene):
