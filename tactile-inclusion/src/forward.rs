@@ -324,24 +324,38 @@ impl Forward {
         force: &dyn Fn(usize) -> f64,
     ) -> Vec<f64> {
         let frames = 0..self.approaches_m.len();
-        let mut values = Vec::with_capacity(self.observations());
-        let pressed = |press: usize, frame: usize| {
-            let frame = press * self.approaches_m.len() + frame;
-            parameters.get(Coordinate::Pressed(frame)).exp()
+        let changed = |press: usize, frame: usize| {
+            parameters.get(Coordinate::Pressed(press * self.approaches_m.len() + frame))
         };
-        for frame in frames.clone() {
+        let of_frame = |frame: usize| -> Vec<f64> {
             let axial = |radius: f64| pressure(frame, radius);
             let of_second = |radius: f64| pressure_of_second(frame, radius);
             match &self.cells {
-                Some(cells) => {
-                    let pressures = cells.pressures(frame, parameters, &axial, &of_second);
-                    let pairs = pressures.iter().zip(&cells.positions.presses);
-                    values.extend(pairs.map(|(p, press)| p * pressed(*press, frame)));
-                }
-                None => values.extend(self.radii_m.iter().map(|&r| axial(r) * pressed(0, frame))),
+                Some(cells) => cells.pressures(frame, parameters, &axial, &of_second),
+                None => self.radii_m.iter().map(|&r| axial(r)).collect(),
             }
+        };
+        let pressures: Vec<Vec<f64>> = frames.clone().map(of_frame).collect();
+        // Exponent of the approach with which a cell's pressure grows, from the nearest frame.
+        let growth = |frame: usize, cell: usize| {
+            let other = if frame == 0 { 1 } else { frame - 1 };
+            let exponent = pressures.get(other).map(|values| {
+                let approaches = self.approaches_m[frame] / self.approaches_m[other];
+                (pressures[frame][cell] / values[cell]).ln() / approaches.ln()
+            });
+            exponent.filter(|e| e.is_finite()).unwrap_or(1.0)
+        };
+        let mut values = Vec::with_capacity(self.observations());
+        for frame in frames.clone() {
+            values.extend(pressures[frame].iter().enumerate().map(|(cell, p)| {
+                let press = (self.cells.as_ref()).map_or(0, |cells| cells.positions.presses[cell]);
+                match changed(press, frame) {
+                    0.0 => *p,
+                    by => p * (by * growth(frame, cell)).exp(),
+                }
+            }));
         }
-        values.extend(frames.map(|frame| force(frame) * pressed(0, frame)));
+        values.extend(frames.map(|frame| force(frame) * changed(0, frame).exp()));
         values
     }
 

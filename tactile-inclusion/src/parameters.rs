@@ -32,8 +32,8 @@ pub(crate) struct Parameters {
     /// Deviation of the axis of each press from its stated position, for the first presses. The
     /// others have none.
     pub strayed_m: Vec<[f64; 2]>,
-    /// Logarithms of the factors by which the approaches of single frames change their pressures,
-    /// press by press. Those left out are zero.
+    /// Logarithms of the factors of the approaches of single frames, press by press. Those left out
+    /// are zero.
     pub pressed: Vec<f64>,
     /// Zero error: the amount by which the measured approaches are too small.
     pub zero_m: f64,
@@ -100,7 +100,7 @@ pub(crate) enum Coordinate {
     Spread,
     /// x and y of the deviation of a press from its stated position, in metres.
     Strayed(usize, usize),
-    /// Logarithm of the factor by which the approach of a press's frame changes its pressure.
+    /// Logarithm of the factor of the approach of a press's frame.
     Pressed(usize),
     /// A coordinate of the second inclusion.
     OfSecond(&'static Coordinate),
