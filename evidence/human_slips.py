@@ -96,7 +96,11 @@ def truths(command):
 def answered(program, folder, call):
     """The result of a call. None if it is refused."""
     ended = subprocess.run([program, *call.split(), "--json"], cwd=folder, capture_output=True, text=True, timeout=120)
-    return None if ended.returncode == 2 or not ended.stdout else json.loads(ended.stdout)
+    if ended.returncode == 2 or not ended.stdout:
+        return None
+    # A stream prints a line for each frame, and its result in the last one.
+    text = ended.stdout.splitlines()[-1] if call.startswith("stream") else ended.stdout
+    return json.loads(text)
 
 
 def kinds(answer):
