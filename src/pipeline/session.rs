@@ -221,7 +221,8 @@ impl Session {
         self
     }
 
-    /// Measures the next frame. A complete contact within the calibration refines the modulus. A frame without contact updates the drift of the light.
+    /// Measures the next frame. A complete contact within the calibration refines the modulus. A
+    /// frame without contact updates the drift of the light.
     ///
     /// # Errors
     /// [`PipelineError::Contact`]. The session can continue with the next frame.

@@ -464,9 +464,9 @@ pub(crate) fn fit(
 }
 
 /// The value below which one in `parts` lies, by [`f64::total_cmp`] (0 if there are no values): for
-/// two the upper median. `scratch` is overwritten. A
-/// sample brackets it, so that most values are only counted. The result does not depend on
-/// the sample: if the bracket misses, all values are examined.
+/// two the upper median. `scratch` is overwritten. A sample brackets it, so that most values are only
+/// counted. The result does not depend on the sample: if the bracket misses, all values are
+/// examined.
 fn quantile(values: &[f64], parts: usize, scratch: &mut Vec<f64>) -> f64 {
     if values.is_empty() {
         return 0.0;

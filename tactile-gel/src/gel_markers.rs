@@ -15,7 +15,10 @@ use crate::{GelError, GelFrame, GelImage, GelSensor};
 /// use tactile_gel::{DarkModel, GelMarkers, GelSensor};
 /// let dots = |shift: usize| {
 ///     let near = |v: usize| v % 16 >= 6 && v % 16 < 10;
-///     Array2::from_shape_fn((96, 112), |(r, c)| if near(r) && near(c + 16 - shift) { 40 } else { 200_u8 })
+///     Array2::from_shape_fn((96, 112), |(r, c)| match near(r) && near(c + 16 - shift) {
+///         true => 40_u8,
+///         false => 200,
+///     })
 /// };
 /// let model = DarkModel::new(1e-4, vec![[0.0, 0.0], [100.0, 5e-4]]);
 /// let sensor = GelSensor::new(model, &dots(0))?;
