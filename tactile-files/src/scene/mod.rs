@@ -110,6 +110,7 @@
 //! Fields counted in errors (`frames[2]`) start at 1.
 mod data;
 mod file;
+#[cfg(feature = "inclusion")]
 mod hidden;
 #[cfg(feature = "inclusion")]
 mod inclusion;
@@ -120,6 +121,7 @@ pub use file::solve_contact_table;
 pub use file::{CalibrationSource, Scene, SceneCheck, SceneFrame, SceneLayer, read_contact_table};
 #[cfg(feature = "inclusion")]
 pub use hidden::HiddenLumps;
+#[cfg(feature = "inclusion")]
 pub use inclusion::{InclusionScene, LoadedInclusion};
 
 pub(crate) use file::{elastic_layers, guide, refractive_index};
