@@ -2,9 +2,8 @@
 use super::error::PipelineError;
 use crate::core::StopReason;
 use crate::force::{
-    BoundingBox, CalibrationDoubt, Estimate, FaceReading, ForceError, ForceMeasurement,
-    ForceWorkspace, LensGeometry, LocalCalibration, Polarity, ProfileShape, ReferenceFrame,
-    Uncertain,
+    BoundingBox, Estimate, FaceReading, ForceError, ForceMeasurement, ForceWorkspace, LensGeometry,
+    LineDoubt, LocalCalibration, Polarity, ProfileShape, ReferenceFrame, Uncertain,
 };
 use ndarray::{Array2, ArrayView2};
 use std::f64::consts::PI;
@@ -108,7 +107,7 @@ pub trait ContactStage: Send + Sync {
     }
 
     /// Doubts about the pairs from which the forces follow.
-    fn doubts(&self) -> &[CalibrationDoubt] {
+    fn doubts(&self) -> &[LineDoubt] {
         &[]
     }
 
@@ -171,7 +170,7 @@ impl<P: Deref<Target: ContactStage> + Send + Sync> ContactStage for P {
         (**self).reads_light()
     }
 
-    fn doubts(&self) -> &[CalibrationDoubt] {
+    fn doubts(&self) -> &[LineDoubt] {
         (**self).doubts()
     }
 

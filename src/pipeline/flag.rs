@@ -2,7 +2,7 @@
 use super::contact::ContactReading;
 use super::error::PipelineError;
 use crate::elasticity::modulus::Warning;
-use crate::force::{CalibrationDoubt, Estimate};
+use crate::force::{Estimate, LineDoubt};
 
 /// A caution about a result. Frames are counted from 0, as in the calls. It also implements
 /// [`Error`](std::error::Error), for callers that reject results with a caution.
@@ -386,12 +386,12 @@ impl Flag {
     /// The caution about pairs of a calibration, for the first frame. `None` for a doubt without
     /// one.
     #[must_use]
-    pub fn of_pairs(doubt: &CalibrationDoubt) -> Option<Self> {
+    pub fn of_pairs(doubt: &LineDoubt) -> Option<Self> {
         match *doubt {
-            CalibrationDoubt::Offset { offset_n } => Some(Self::GaugeNotZeroed {
+            LineDoubt::Offset { offset_n } => Some(Self::GaugeNotZeroed {
                 offset_n: offset_n.value,
             }),
-            CalibrationDoubt::Outlier {
+            LineDoubt::Outlier {
                 pair,
                 force_n,
                 expected_n,
@@ -400,7 +400,7 @@ impl Flag {
                 force_n,
                 expected_n,
             }),
-            CalibrationDoubt::Bend { departure } => Some(Self::LightNotProportional {
+            LineDoubt::Bend { departure } => Some(Self::LightNotProportional {
                 frame: 0,
                 departure,
             }),

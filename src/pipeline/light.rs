@@ -2,8 +2,8 @@
 use super::contact::{ContactReading, ContactStage, FrameContact, resize};
 use super::error::PipelineError;
 use crate::force::{
-    CalibrationDoubt, CalibrationPair, ForceError, ForceMeter, ForceOptions, ForceWorkspace,
-    LensGeometry, LinearCalibration, LocalCalibration, Polarity, ReferenceFrame, StressCalibration,
+    CalibrationPair, ForceError, ForceMeter, ForceOptions, ForceWorkspace, LensGeometry, LineDoubt,
+    LinearCalibration, LocalCalibration, Polarity, ReferenceFrame, StressCalibration,
 };
 use ndarray::ArrayView2;
 use std::sync::Arc;
@@ -51,7 +51,7 @@ pub struct LightContact {
     polarity: Polarity,
     lens: Option<LensGeometry>,
     /// Doubts about the pairs to which a line was fitted.
-    doubts: Vec<CalibrationDoubt>,
+    doubts: Vec<LineDoubt>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -181,7 +181,7 @@ impl ContactStage for LightContact {
             self.meter
                 .measure_with(workspace, frame, reference, self.calibration.as_ref())?;
         let bend = self.doubts.iter().find_map(|doubt| match doubt {
-            CalibrationDoubt::Bend { departure } => Some(*departure),
+            LineDoubt::Bend { departure } => Some(*departure),
             _ => None,
         });
         contact.reading = ContactReading::of_light(&force).map(|reading| ContactReading {
@@ -212,7 +212,7 @@ impl ContactStage for LightContact {
         Ok(())
     }
 
-    fn doubts(&self) -> &[CalibrationDoubt] {
+    fn doubts(&self) -> &[LineDoubt] {
         &self.doubts
     }
 

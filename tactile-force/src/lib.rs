@@ -52,8 +52,8 @@ mod shear;
 mod tiles;
 
 pub use calibration::{
-    Branch, CalibrationDoubt, CalibrationFrame, CalibrationPair, CurveHysteresis, ForceReading,
-    GreyHistogram, Hysteresis, LineReport, LinearCalibration, LocalCalibration, PressureCurve,
+    Branch, CalibrationFrame, CalibrationPair, CurveHysteresis, ForceReading, GreyHistogram,
+    Hysteresis, LineDoubt, LineReport, LinearCalibration, LocalCalibration, PressureCurve,
     PressureCurveOptions, PressureCurveReport, StressCalibration,
 };
 pub use contact::{Contact, ContactOptions};

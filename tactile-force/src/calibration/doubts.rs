@@ -21,7 +21,7 @@ const LEAST_BEND: f64 = 6e-3;
 /// A reason to doubt the pairs of a calibration.
 ///
 /// ```
-/// use tactile_force::{CalibrationPair, LinearCalibration, CalibrationDoubt};
+/// use tactile_force::{CalibrationPair, LinearCalibration, LineDoubt};
 /// let doubts = |forces: [f64; 7]| {
 ///     let noise = |k: usize| 1e-4 * [1.0, -1.0, 0.5][k % 3];
 ///     let pairs: Vec<_> = (0..7)
@@ -31,15 +31,15 @@ const LEAST_BEND: f64 = 6e-3;
 /// };
 /// assert_eq!(doubts([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6])?, []);
 /// let not_zeroed = doubts([0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.65])?;
-/// assert!(matches!(not_zeroed[..], [CalibrationDoubt::Offset { offset_n }] if offset_n.value > 0.049));
+/// assert!(matches!(not_zeroed[..], [LineDoubt::Offset { offset_n }] if offset_n.value > 0.049));
 /// let mistyped = doubts([0.0, 0.1, 0.2, 3.0, 0.4, 0.5, 0.6])?;
-/// assert!(matches!(mistyped[..], [CalibrationDoubt::Outlier { pair: 3, .. }]));
+/// assert!(matches!(mistyped[..], [LineDoubt::Outlier { pair: 3, .. }]));
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
-pub enum CalibrationDoubt {
+pub enum LineDoubt {
     /// The line has a force without light: the gauge was not zeroed, or the sums contain other
     /// light. Every force has this standard error.
     Offset {
@@ -63,7 +63,7 @@ pub enum CalibrationDoubt {
     },
 }
 
-impl CalibrationDoubt {
+impl LineDoubt {
     /// The doubts about pairs and their line. An outlier hides the others. O(pairs).
     pub(super) fn of(
         pairs: &[CalibrationPair],

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 use tactile_core::Estimate;
 
-use super::{Branch, CalibrationDoubt, CalibrationPair, StressCalibration};
+use super::{Branch, CalibrationPair, LineDoubt, StressCalibration};
 use crate::error::{ForceError, check_observations};
 
 /// A straight line from integrated pixel value to force, F = b + s V, or F = s V through the
@@ -107,7 +107,7 @@ impl LinearCalibration {
         let curve = |v: f64| level_n.value + slope_n.value * (v - centre);
         let mut report = LineReport::new(pairs, curve, columns);
         report.doubts = match parameters[..] {
-            [offset_n, _] => CalibrationDoubt::of(pairs, offset_n, report.full_scale_n),
+            [offset_n, _] => LineDoubt::of(pairs, offset_n, report.full_scale_n),
             _ => Vec::new(),
         };
         report.parameters = parameters;
@@ -169,7 +169,7 @@ impl StressCalibration for LinearCalibration {
         // branches.
         let branch = self.report.hysteresis.map_or(0.0, |h| h.width_n);
         let offset = self.report.doubts.iter().find_map(|doubt| match doubt {
-            CalibrationDoubt::Offset { offset_n } => Some(offset_n.value),
+            LineDoubt::Offset { offset_n } => Some(offset_n.value),
             _ => None,
         });
         let all = branch * branch + offset.map_or(0.0, |offset| offset * offset);
@@ -270,7 +270,7 @@ pub struct LineReport {
     /// Whether the curve increases between the pixel values of the pairs.
     pub monotone: bool,
     /// Reasons to doubt the pairs of a line with an offset.
-    pub doubts: Vec<CalibrationDoubt>,
+    pub doubts: Vec<LineDoubt>,
 }
 
 impl LineReport {

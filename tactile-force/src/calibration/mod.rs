@@ -19,7 +19,7 @@ mod line;
 pub use curve::{
     CalibrationFrame, CurveHysteresis, PressureCurve, PressureCurveOptions, PressureCurveReport,
 };
-pub use doubts::CalibrationDoubt;
+pub use doubts::LineDoubt;
 pub use line::{Hysteresis, LineReport, LinearCalibration};
 
 use ndarray::Array2;
