@@ -72,6 +72,21 @@ const VIGNETTING_TILES: usize = 1500;
 /// Largest share of defects. More of them are a texture of the sensor.
 const MOST_DEFECTS: f64 = 1e-3;
 
+/// Rows and columns of the two to four pixels beside a pixel.
+pub(crate) fn neighbours(
+    (row, column): (usize, usize),
+    (rows, columns): (usize, usize),
+) -> impl Iterator<Item = (usize, usize)> {
+    [
+        row.checked_sub(1).map(|r| (r, column)),
+        (row + 1 < rows).then_some((row + 1, column)),
+        column.checked_sub(1).map(|c| (row, c)),
+        (column + 1 < columns).then_some((row, column + 1)),
+    ]
+    .into_iter()
+    .flatten()
+}
+
 /// The hot and dead pixels of an image in standard layout.
 fn defects_of(image: &Array2<u8>, sd: f64) -> Vec<(usize, usize)> {
     let (rows, columns) = image.dim();
@@ -92,15 +107,7 @@ fn defects_of(image: &Array2<u8>, sd: f64) -> Vec<(usize, usize)> {
                 continue;
             }
             for column in [column - 1, column] {
-                let beside = [
-                    row.checked_sub(1).map(|r| (r, column)),
-                    (row + 1 < rows).then_some((row + 1, column)),
-                    column.checked_sub(1).map(|c| (row, c)),
-                    (column + 1 < columns).then_some((row, column + 1)),
-                ];
-                let near = beside
-                    .into_iter()
-                    .flatten()
+                let near = neighbours((row, column), (rows, columns))
                     .filter(|&(r, c)| !far(line[column], pixels[r * columns + c]));
                 if near.count() <= 1 && found.last() != Some(&(row, column)) {
                     found.push((row, column));

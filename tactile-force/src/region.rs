@@ -11,7 +11,7 @@ use tactile_core::{BoundingBox, Loop, vectorised};
 
 use crate::drift::{DriftLine, IlluminationDrift};
 use crate::flat_field::FlatLine;
-use crate::frame::{Levels, ReferenceFrame};
+use crate::frame::{Levels, ReferenceFrame, neighbours};
 use crate::noise::{DifferenceNoise, trimmed_variance};
 use crate::runs::{Components, Run, grow, push_runs};
 
@@ -80,18 +80,10 @@ impl Region {
         let (rows, columns) = (place.rows(), place.columns());
         for (row, column) in reference.defects_in(place) {
             let (y, x) = (row - place.row_start, column - place.column_start);
-            let beside = [
-                y.checked_sub(1).map(|y| (y, x)),
-                (y + 1 < rows).then_some((y + 1, x)),
-                x.checked_sub(1).map(|x| (y, x)),
-                (x + 1 < columns).then_some((y, x + 1)),
-            ];
-            let sum = beside
-                .into_iter()
-                .flatten()
-                .fold((0.0, 0.0), |sum, (y, x)| {
-                    (sum.0 + self.difference[y * columns + x], sum.1 + 1.0)
-                });
+            let beside = neighbours((y, x), (rows, columns));
+            let sum = beside.fold((0.0, 0.0), |sum, (y, x)| {
+                (sum.0 + self.difference[y * columns + x], sum.1 + 1.0)
+            });
             self.difference[y * columns + x] = sum.0 / f32::max(sum.1, 1.0);
         }
     }

@@ -47,7 +47,8 @@ impl GelMarkers {
     }
 
     /// Follows the dots to the next frame, whose face is `reading`. The result is the slip of the
-    /// first contact since it began: `None` without contact, or with fewer than four dots under it.
+    /// first contact since it began: `None` without contact, with doubtful pairs, or with fewer than
+    /// four dots under the contact.
     ///
     /// # Errors
     /// [`GelError::Markers`] for a frame with too few dots. The dots then stay where they were.
@@ -59,6 +60,10 @@ impl GelMarkers {
         self.field = self.field.followed(&dots_of(frame.into()))?;
         if reading.contacts.is_empty() {
             self.touched = None;
+            return Ok(None);
+        }
+        // Doubtful pairs show no slip, and no start of a contact.
+        if self.field.doubt.is_some() {
             return Ok(None);
         }
         let covers = |place: Point2<f64>| {

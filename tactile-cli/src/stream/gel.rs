@@ -64,8 +64,8 @@ impl<P: Pixels> Meter for Gel<P> {
         "time (s)   force (N)   largest depth (mm)   contact (mm²)   slip (%)   late (%)".to_owned()
     }
 
-    const COLUMNS: &'static str = "force_N,force_error_N,contact_area_m2,largest_depth_m,largest_depth_error_m,\
-         force_x_N,force_x_error_N,force_y_N,force_y_error_N,torque_z_Nm,torque_z_error_Nm,slip_share";
+    const COLUMNS: &'static str = "force_N,force_error_N,contact_area_m2,largest_depth_m,\
+         largest_depth_error_m,force_x_N,force_x_error_N,force_y_N,force_y_error_N,torque_z_Nm,torque_z_error_Nm,slip_share";
 
     fn measure(&mut self, frame: &P) -> Result<Row, Box<dyn Error>> {
         let reading = self.reader.sensor.read(frame.image())?;

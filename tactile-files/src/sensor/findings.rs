@@ -110,7 +110,8 @@ pub enum SensorError {
 ///     contact_radius_m: Some(Estimate::new(2.01e-3, 2e-6)),
 ///     layers_force_n: None,
 /// };
-/// assert!(finding.read_force_n.is_some_and(|read| (read.value / finding.force_n - 1.0).abs() < 0.01));
+/// let off = finding.read_force_n.map(|read| read.value / finding.force_n - 1.0);
+/// assert!(off.is_some_and(|off| off.abs() < 0.01));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PressFinding {
