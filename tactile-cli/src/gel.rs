@@ -385,11 +385,12 @@ fn depth_of<P: Pixels>(
         let reading = reader.sensor.read(pixels.image());
         let reading = reading.map_err(|error| Failure::in_file(Path::new(name), error))?;
         context.line(format_args!("{name}:"));
-        let contacts = contacts(&reading, &reader.forces(&reading), forces);
+        let each = reader.forces(&reading);
+        let contacts = contacts(&reading, &each, forces);
         match contacts.as_slice() {
             [] if reading.is_refused() => context.line("not read"),
             [] => context.line("no contact"),
-            all => print_contacts(&reading, &reader.forces(&reading), all.len(), context),
+            all => print_contacts(&reading, &each, all.len(), context),
         }
         warn(&reading, name, context);
         let mut value = json!({

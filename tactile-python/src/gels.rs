@@ -332,8 +332,14 @@ impl GelSensor {
             if let Some(markers) = markers.filter(|_| !frame.is_refused()) {
                 // A follower that panicked has its last state.
                 let mut markers = markers.lock().unwrap_or_else(PoisonError::into_inner);
-                forces.slip = markers.follow(image, &frame)?;
-                doubt = markers.field().doubt.map(|doubt| doubt.to_string());
+                // Depth and contacts do not depend on the dots.
+                doubt = match markers.follow(image, &frame) {
+                    Ok(slip) => {
+                        forces.slip = slip;
+                        markers.field().doubt.map(|doubt| doubt.to_string())
+                    }
+                    Err(error) => Some(error.to_string()),
+                };
                 if let (Some(GelLaw::Layer(law)), None) = (&self.law, &doubt) {
                     forces.wrench = law.wrench(&frame, Some(markers.field()));
                 }

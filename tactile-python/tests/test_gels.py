@@ -233,3 +233,6 @@ def test_a_follower_gives_shear_and_slip():
     assert frame.slip == 0.0 and frame.torque.standard_error > 0
     assert sensor.read(dotted(press, 4.0)).shear is None
     assert pickle.loads(pickle.dumps(frame)) == frame
+    # Without visible dots the face is read, and a flag gives the reason.
+    hidden = live.read(press)
+    assert hidden.force is not None and hidden.shear is None and len(hidden.flags) == 1
