@@ -36,7 +36,7 @@ type NextPairs<const D: usize> = fn(
     &[Point<f64, D>],
     &mut MatchedPairs,
 ) -> Result<(), MatchError>;
-type Search<const D: usize> = fn(&AnnealedSoftassign, &mut SoftassignWorkspace<D>, Watch<'_>);
+type Search<const D: usize> = fn(&mut SoftassignWorkspace<D>, Watch<'_>);
 
 type Both<M> = Instances<Once<M, 2>, Once<M, 3>>;
 static SOFTASSIGN: Both<AnnealedSoftassign> =
@@ -48,20 +48,16 @@ static NEXT_PAIRS: Instances<NextPairs<2>, NextPairs<3>> = Instances(
     AnnealedSoftassign::next_pairs,
 );
 static SEARCH: Instances<Search<2>, Search<3>> =
-    Instances(AnnealedSoftassign::solve, AnnealedSoftassign::solve);
+    Instances(SoftassignWorkspace::solve, SoftassignWorkspace::solve);
 static DRIFT: Both<CoherentPointDrift> =
     Instances(CoherentPointDrift::once, CoherentPointDrift::once);
 static LABELLING: Both<RelaxationLabelling> =
     Instances(RelaxationLabelling::once, RelaxationLabelling::once);
 
-impl AnnealedSoftassign {
-    /// The search, instantiated in this crate.
-    pub(crate) fn search_in<const D: usize>(
-        &self,
-        workspace: &mut SoftassignWorkspace<D>,
-        watch: Watch<'_>,
-    ) -> Result<(), MatchError> {
-        SEARCH.of::<Search<D>>(D)?(self, workspace, watch);
+impl<const D: usize> SoftassignWorkspace<D> {
+    /// [`solve`](Self::solve), instantiated in this crate.
+    pub(crate) fn search(&mut self, watch: Watch<'_>) -> Result<(), MatchError> {
+        SEARCH.of::<Search<D>>(D)?(self, watch);
         Ok(())
     }
 }

@@ -1,12 +1,12 @@
 //! From the last soft assignment to the answer: hard matches, confidences, positions and
 //! covariances.
 
-use super::Mechanism;
 use super::assign::SoftAssignment;
-use super::options::Slack;
-use super::run::{Annealer, State};
-use super::{difference, dot, squared, squared_distance};
-use crate::{Doubt, Outliers, linear_assignment};
+use super::problem::Problem;
+use super::run::{Annealer, Run};
+use super::search::{Outcome, Runner};
+use super::{Mechanism, difference, dot, squared, squared_distance};
+use crate::{Doubt, Judgement, MatchReport, Outliers, StopReason, linear_assignment};
 use std::f64::consts::TAU;
 
 /// The answer in the units of the frame.
@@ -17,36 +17,18 @@ pub(super) struct Answer<const D: usize> {
     pub confidence: Vec<f64>,
     /// Posterior variance of the positions, along one axis.
     pub variance: Vec<f64>,
-    pub residual: f64,
-    pub column_best: Vec<(f64, usize)>,
-    pub odds: PairOdds,
+    /// The report, in the units of the points.
+    pub report: MatchReport,
+    column_best: Vec<(f64, usize)>,
+    odds: PairOdds,
 }
 
-/// Residuals below these limits, in radii of the model and in spacings, are the truncation error of
-/// the prior's factor: the data are clean.
-const CLEAN_SIGMA: [f64; 2] = [3e-3, 0.05];
-/// Corresponding limits for the lowest temperature of a run: partners a twentieth of a spacing
-/// apart are distinguished.
-const MIN_SIGMA: [f64; 2] = [1e-3, 1.0 / 60.0];
-/// Resolution at which residuals are compared. If it depended on the radius alone, a set of 20,000
-/// points would be compared at its spacing, where no answer is likelier than chance.
-const ENERGY_RESOLUTION: [f64; 2] = [0.01, 0.2];
 /// An answer is read at this multiple of the lowest temperature or above: the truncation of the
 /// prior's factor must not cost a clean pair its match.
 const READ: f64 = 1.4;
 /// Minimum log-likelihood gain per point over a uniform target distribution. Wrong basins have a
 /// negative gain.
 pub(super) const MIN_TELLING_GAIN: f64 = 0.2;
-
-impl<const D: usize> Annealer<D> {
-    /// Sets the limits that separate noise from the truncation of the prior, for this spacing.
-    pub(super) fn set_resolution(&mut self, spacing: f64) {
-        let least = |[radii, spacings]: [f64; 2]| radii.min(spacings * spacing);
-        self.clean_sigma = least(CLEAN_SIGMA);
-        self.least_sigma = least(MIN_SIGMA);
-        self.resolution = least(ENERGY_RESOLUTION);
-    }
-}
 
 /// Spread of the soft partners, relative to the temperature, above which the pairs are undecided,
 /// however high their individual confidences. At 0.45 nineteen of twenty pairs are correct; at 0.55
@@ -68,17 +50,48 @@ pub(super) fn are_unequal(model: usize, target: usize) -> bool {
 const MAX_COMPLETED: usize = 1_000_000;
 
 impl<const D: usize> Answer<D> {
-    /// Why the pairs are not reliable. `smaller` is the number of points that could have a partner,
-    /// and `share` the fraction of them expected to have none. `gain` is the log-likelihood gain
-    /// per point over a uniform target distribution.
-    pub(super) fn doubt(
-        &self,
-        smaller: usize,
-        share: f64,
-        gain: f64,
-        state: &State<D>,
-    ) -> Option<Doubt> {
-        let tail = state.tail;
+    /// The answer of a search whose soft matches and regression are those of `best`.
+    pub(super) fn conclude(
+        &mut self,
+        problem: &Problem<D>,
+        runner: &mut Runner<D>,
+        best: &Run<D>,
+        outcome: Outcome,
+    ) {
+        let residual = self.read(problem, runner, best);
+        self.keep_within_reach(problem);
+        if problem.options.outliers != Outliers::Both {
+            self.complete(problem);
+        }
+        // An exact answer fits the targets perfectly.
+        let gain = problem.gain(best).unwrap_or(f64::INFINITY);
+        let symmetric = outcome.symmetric.then_some(Doubt::Symmetric);
+        let own = self.doubt(problem, gain, best);
+        let doubt = outcome.rival.or(own).or(symmetric);
+        if let Some(doubt) = doubt {
+            self.lower_confidences(doubt, gain);
+        }
+        // The lowest temperature is reached, to rounding.
+        let coldest = best.sigma <= 1.000_001 * problem.limits.least;
+        self.report = MatchReport {
+            stop: match () {
+                () if outcome.stopped => StopReason::Cancelled,
+                () if coldest && !runner.fine.found && doubt.is_none() => StopReason::Exact,
+                () if best.settled => StopReason::Converged,
+                () => StopReason::IterationLimit,
+            },
+            iterations: best.iterations,
+            starts: outcome.starts,
+            residual: residual * problem.frame.scale,
+            sigma: runner.fine.sigma.unwrap_or(best.sigma) * problem.frame.scale,
+            judgement: doubt.map_or(Judgement::Sure, Judgement::Doubtful),
+        };
+    }
+
+    /// Why the pairs are not reliable. `gain` is the log-likelihood gain per point over a uniform
+    /// target distribution.
+    fn doubt(&self, problem: &Problem<D>, gain: f64, run: &Run<D>) -> Option<Doubt> {
+        let (tail, smaller, share) = (run.tail, problem.smaller(), problem.options.share);
         let pairs = self.assignment.iter().flatten().count() as f64;
         // An answer with fewer pairs, relative to the smaller set, may be a chance result: wrong
         // basins of stretched or rotated sets matched up to two fifths. The limit falls if the
@@ -90,7 +103,7 @@ impl<const D: usize> Answer<D> {
         // This limit trades false alarms for missed ones: of 912 held-out answers
         // (`--example confidence -- 100 6`), 39 correct ones are doubted and 10 of 235 wrong ones
         // are not. When the limit was chosen, the numbers were 37 and 10, and 22 and 13 at 0.4.
-        if self.risk(smaller, gain, tail) < 0.25 && state.ambiguity < MOST_AMBIGUOUS {
+        if self.risk(smaller, gain, tail) < 0.25 && run.ambiguity < MOST_AMBIGUOUS {
             return None;
         }
         // Such a large tail is caused by a displaced part of the set.
@@ -117,7 +130,7 @@ impl<const D: usize> Answer<D> {
     }
 
     /// Mean confidence of the pairs. 1 if there are none.
-    pub(super) fn sureness(&self) -> f64 {
+    fn sureness(&self) -> f64 {
         let paired = self.assignment.iter().zip(&self.confidence);
         let (mut pairs, mut sure) = (0.0, 0.0);
         for (_, confidence) in paired.filter(|(partner, _)| partner.is_some()) {
@@ -130,7 +143,7 @@ impl<const D: usize> Answer<D> {
     /// Lowers the confidences of a doubtful answer. Before, each is the probability that the pair
     /// is correct if all others are; afterwards it is unconditional. `gain` is the log-likelihood
     /// gain per point over a uniform target distribution.
-    pub(super) fn lower_confidences(&mut self, doubt: Doubt, gain: f64) {
+    fn lower_confidences(&mut self, doubt: Doubt, gain: f64) {
         // The probability that the answer as a whole is correct is logistic in the gain and in the
         // mean confidence. The power accounts for noise that is larger than estimated. Both were
         // fitted to every second of about 570 doubtful answers: from the scenes of
@@ -151,82 +164,83 @@ impl<const D: usize> Answer<D> {
         }
     }
 
-    /// Reads the answer from the final state of the run. `spread` is the variance of the positions
-    /// between the scales of the prior, empty if there is one scale. `gain` is the gain of the
-    /// answer over chance, see [`SoftassignWorkspace::gain`](super::SoftassignWorkspace).
-    pub(super) fn read(
-        &mut self,
-        annealer: &mut Annealer<D>,
-        state: &State<D>,
-        targets: &[[f64; D]],
-        slack: Slack,
-        spread: &[f64],
-        without: Option<Mechanism>,
-    ) {
-        let n = state.warped.len();
-        let clean = annealer.clean_sigma;
-        let noisy = state.noisy || state.sigma > clean;
-        let least = if state.noisy {
+    /// Reads pairs and positions. Returns the root mean square residual of the pairs.
+    fn read(&mut self, problem: &Problem<D>, runner: &mut Runner<D>, best: &Run<D>) -> f64 {
+        let Runner {
+            annealer,
+            scales,
+            fine,
+            ..
+        } = runner;
+        let (targets, n) = (&problem.target, best.warped.len());
+        let noisy = best.noisy || best.sigma > problem.limits.clean;
+        let least = if best.noisy {
             0.0
         } else {
-            READ * annealer.least_sigma
+            READ * problem.limits.least
         };
-        let variance = state.sigma.max(least).powi(2);
+        let variance = best.sigma.max(least).powi(2);
         // Soft matches are read with weights raised to this power. After scaling of rows and
         // columns, the log-odds of two points that may be swapped are half of those of the whole
         // permutations; the power compensates for this. The confidences of pairs come from
         // [`PairOdds`].
         let (sweeps, sharpness) = if noisy { (8, 1.55) } else { (3, 1.0) };
-        annealer.assign(&state.warped, variance, slack, sweeps, sharpness);
+        annealer.assign(&best.warped, variance, problem.slack(), sweeps, sharpness);
         annealer.soft.cap_rows();
         self.assign(&annealer.soft, n, targets.len());
         // A rigid motion always leaves residuals, so its points are not moved onto their targets.
-        let snaps = !noisy && !annealer.rigid.is_active();
-        let fit = self.place(state, targets, snaps);
-        if !annealer.rigid.is_active() {
+        let snaps = !noisy && problem.bends();
+        let (residual, fit) = self.place(best, targets, snaps);
+        if problem.bends() {
             annealer.regression.variances(&annealer.prior, noisy);
         }
-        if noisy && without != Some(Mechanism::PairOdds) {
+        if noisy && problem.options.has(Mechanism::PairOdds) {
             let fitted = Fitted {
+                problem,
                 annealer,
-                warped: &state.warped,
-                targets,
+                warped: &best.warped,
                 variance,
             };
             self.odds
                 .weigh(fitted, &mut self.assignment, &mut self.confidence);
         }
         self.variance.clear();
+        if best.noisy {
+            self.variance.extend_from_slice(&fine.variance);
+            return residual;
+        }
         for i in 0..n {
-            let of_warp = annealer.regression.variance[i] + spread.get(i).copied().unwrap_or(0.0);
+            // Empty if there is one scale of the prior.
+            let between = scales.spread.get(i).copied().unwrap_or(0.0);
             // A point that was moved onto its target has the target's error.
             let on_target = snaps && self.assignment[i].is_some();
-            self.variance.push(if on_target { fit } else { of_warp });
+            self.variance.push(match on_target {
+                true => fit,
+                false => annealer.regression.variance[i] + between,
+            });
+        }
+        residual
+    }
+
+    /// Removes pairs that moved farther than allowed.
+    fn keep_within_reach(&mut self, problem: &Problem<D>) {
+        let (still, farthest) = (problem.frame.still(), problem.farthest);
+        if farthest.is_infinite() {
+            return;
+        }
+        for (i, partner) in self.assignment.iter_mut().enumerate() {
+            let place = std::array::from_fn(|k| problem.model[i][k] + still[k]);
+            let near =
+                |&j: &usize| squared_distance(&problem.target[j], &place) <= farthest * farthest;
+            if partner.is_some() && partner.filter(near).is_none() {
+                (*partner, self.confidence[i]) = (None, 0.5);
+            }
         }
     }
 
-    /// Removes pairs that moved farther than allowed. Completes the pairs if every point of the
-    /// smaller set, or of one side, has a partner.
-    pub(super) fn finish(
-        &mut self,
-        outliers: Outliers,
-        targets: &[[f64; D]],
-        model: &[[f64; D]],
-        (still, farthest): ([f64; D], f64),
-    ) {
-        if farthest.is_finite() {
-            for (i, partner) in self.assignment.iter_mut().enumerate() {
-                let place = std::array::from_fn(|k| model[i][k] + still[k]);
-                let near =
-                    |&j: &usize| squared_distance(&targets[j], &place) <= farthest * farthest;
-                if partner.is_some() && partner.filter(near).is_none() {
-                    (*partner, self.confidence[i]) = (None, 0.5);
-                }
-            }
-        }
-        if outliers == Outliers::Both {
-            return;
-        }
+    /// Completes the pairs if every point of the smaller set, or of one side, has a partner.
+    fn complete(&mut self, problem: &Problem<D>) {
+        let (model, targets) = (&problem.model, &problem.target);
         let left: Vec<usize> = (0..model.len())
             .filter(|&i| self.assignment[i].is_none())
             .collect();
@@ -278,10 +292,10 @@ impl<const D: usize> Answer<D> {
         }
     }
 
-    /// Sets the positions, on their targets if `snaps`. Returns the variance, along one axis, of
-    /// the residuals of the warp alone.
-    fn place(&mut self, state: &State<D>, targets: &[[f64; D]], snaps: bool) -> f64 {
-        self.warped.clone_from(&state.warped);
+    /// Sets the positions, on their targets if `snaps`. Returns their root mean square distance from
+    /// the targets, and the variance, along one axis, of the residuals of the warp alone.
+    fn place(&mut self, run: &Run<D>, targets: &[[f64; D]], snaps: bool) -> (f64, f64) {
+        self.warped.clone_from(&run.warped);
         let (mut left, mut squares, mut pairs) = (0.0, 0.0, 0);
         for (i, partner) in self.assignment.iter().enumerate() {
             let &Some(j) = partner else { continue };
@@ -293,8 +307,7 @@ impl<const D: usize> Answer<D> {
             pairs += 1;
         }
         let count = f64::from(pairs.max(1));
-        self.residual = (squares / count).sqrt();
-        left / (D as f64 * count)
+        ((squares / count).sqrt(), left / (D as f64 * count))
     }
 }
 
@@ -351,9 +364,9 @@ struct Leverage {
 /// The fit by which pairs are judged.
 #[derive(Clone, Copy)]
 struct Fitted<'a, const D: usize> {
+    problem: &'a Problem<D>,
     annealer: &'a Annealer<D>,
     warped: &'a [[f64; D]],
-    targets: &'a [[f64; D]],
     /// Variance of the noise along an axis.
     variance: f64,
 }
@@ -404,7 +417,7 @@ impl PairOdds {
             *partner = partner.filter(|_| !hopeless);
         }
         self.owners.clear();
-        self.owners.resize(fitted.targets.len(), None);
+        self.owners.resize(fitted.problem.target.len(), None);
         for (i, partner) in assignment.iter().enumerate() {
             if let &Some(j) = partner {
                 self.owners[j] = Some(i);
@@ -491,7 +504,8 @@ impl PairOdds {
         // Half a point is added to both counts. If none of a few points is unpaired, an unpaired
         // point is still possible.
         let left_model = (self.partners.len() as f64 - pairs + 0.5) / (pairs + 0.5);
-        let left_target = (fitted.targets.len() as f64 - pairs + 0.5) / fitted.annealer.volume;
+        let left_target =
+            (fitted.problem.target.len() as f64 - pairs + 0.5) / fitted.problem.volume;
         let scale = left_model * left_target * (TAU * fitted.variance).powf(0.5 * D as f64);
         self.against.clear();
         self.against.resize(self.partners.len(), 0.0);
@@ -590,7 +604,7 @@ impl PairOdds {
 impl<const D: usize> Fitted<'_, D> {
     /// Offset of target j from the warped position of point i.
     fn offset(&self, i: usize, j: usize) -> [f64; D] {
-        difference(&self.targets[j], &self.warped[i])
+        difference(&self.problem.target[j], &self.warped[i])
     }
 
     /// Whether no candidate of point i stands out from the others.
@@ -612,6 +626,6 @@ impl<const D: usize> Fitted<'_, D> {
 
     /// Offset from one target to another.
     fn step(&self, from: usize, to: usize) -> [f64; D] {
-        difference(&self.targets[to], &self.targets[from])
+        difference(&self.problem.target[to], &self.problem.target[from])
     }
 }

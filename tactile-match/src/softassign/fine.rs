@@ -1,9 +1,9 @@
 //! Residuals below the resolution of the annealing: decides whether they are noise, and places the
 //! points accordingly.
 
-use super::run::State;
-use super::search::is_cold;
-use super::{AnnealedSoftassign, Mechanism, Search, SoftassignWorkspace, Transformation};
+use super::run::Run;
+use super::search::Race;
+use super::{Mechanism, Search};
 use super::{difference, in_space, squared, squared_distance};
 use crate::hard::nearest;
 use crate::judgement::median_of_chi_squared;
@@ -77,30 +77,31 @@ pub(super) struct FineFit<const D: usize> {
     system: System<D>,
 }
 
-impl AnnealedSoftassign {
-    /// Whether the residuals of decided pairs are noise. If so, `ws.best` gets the noise and the
+impl<const D: usize> Race<'_, D> {
+    /// Whether the residuals of decided pairs are noise. If so, the best run gets the noise and the
     /// positions.
-    pub(super) fn resolve<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) -> bool {
-        ws.fine.forget();
+    pub(super) fn resolve(&mut self) -> bool {
+        let problem = self.problem;
+        self.runner.fine.forget();
         // A dense fit takes many times as long as the single run of a nearby search.
-        let thorough = matches!(self.search, Search::Thorough);
-        let bends = thorough && self.transformation == Transformation::Smooth;
-        let allowed = self.has(Mechanism::Fine);
-        let smaller = ws.model.len().min(ws.target.len()) as f64;
-        if !bends || !allowed || !(ws.best.sigma <= ws.annealer.clean_sigma || is_cold(ws)) {
+        let thorough = problem.options.search == Search::Thorough;
+        let small = self.best.sigma <= problem.limits.clean || self.is_cold();
+        if !(thorough && problem.bends() && self.has(Mechanism::Fine) && small) {
             return false;
         }
         // Decided partners are at most this far from their targets.
-        let reach = if self.is_exact(ws) {
+        let reach = if self.is_exact() {
             0.0
         } else {
-            0.3 * ws.spacing
+            0.3 * problem.spacing
         };
-        let whole = ws.model.len() <= MAX_WHOLE;
-        let fine = &mut ws.fine;
-        fine.pair(&ws.model, &ws.best.warped, &ws.target, reach);
-        let sets = (&*ws.model, &*ws.best.base, &*ws.target);
-        let enough = 0.9 * smaller.min(if whole { f64::INFINITY } else { PATCH as f64 });
+        let whole = problem.model.len() <= MAX_WHOLE;
+        let (fine, best) = (&mut self.runner.fine, &mut *self.best);
+        let (model, target) = (&*problem.model, &*problem.target);
+        fine.pair(model, &best.warped, target, reach);
+        let sets = (model, &*best.base, target);
+        let most = if whole { f64::INFINITY } else { PATCH as f64 };
+        let enough = 0.9 * most.min(problem.smaller() as f64);
         let are_enough = |fine: &FineFit<D>| fine.pairs.len() as f64 >= enough;
         let noisy = are_enough(fine) && fine.are_noisy(sets) && are_enough(fine);
         // Chance partners within that reach look like noise of at least twice this size.
@@ -108,10 +109,10 @@ impl AnnealedSoftassign {
         if !(noisy && small && whole) {
             return false;
         }
-        fine.place(&ws.model, &mut ws.best);
-        if ws.best.sigma > ws.annealer.clean_sigma {
+        fine.place(model, best);
+        if best.sigma > problem.limits.clean {
             // The annealing resolves this noise, and its average over scales is more accurate.
-            ws.best.noisy = false;
+            best.noisy = false;
             fine.forget();
         }
         true
@@ -256,14 +257,14 @@ impl<const D: usize> FineFit<D> {
     }
 
     /// Moves the points to the positions of the fit.
-    fn place(&mut self, model: &[[f64; D]], state: &mut State<D>) {
+    fn place(&mut self, model: &[[f64; D]], run: &mut Run<D>) {
         let sigma = self.system.noise();
         self.sigma = Some(sigma);
-        (state.sigma, state.noisy) = (sigma, true);
+        (run.sigma, run.noisy) = (sigma, true);
         self.variance.clear();
         for (i, point) in model.iter().enumerate() {
             let (displacement, variance) = self.system.predict(point);
-            state.warped[i] = std::array::from_fn(|d| state.base[i][d] + displacement[d]);
+            run.warped[i] = std::array::from_fn(|d| run.base[i][d] + displacement[d]);
             self.variance.push(sigma * sigma * variance);
         }
     }

@@ -1,12 +1,11 @@
 //! Matching of large sets, from coarse to fine.
 
 use super::assign::Blocks;
-use super::run::{Annealer, Cooling, Schedule, State};
-use super::search::{FAST, MAX_PATTERN_REACH, SCALES, warmth};
-use super::{
-    AnnealedSoftassign, Mechanism, Rotation, SoftassignWorkspace, squared_distance, starts,
-};
-use crate::Watch;
+use super::problem::{Problem, typical_spacing};
+use super::run::{Annealer, Cooling, Run, Schedule};
+use super::search::{FAST, MAX_PATTERN_REACH, Race, Runner, SCALES};
+use super::{Mechanism, Rotation, squared_distance, starts};
+use crate::Doubt;
 use crate::gaussian_process::{Axes, Prior};
 use std::ops::ControlFlow;
 
@@ -22,156 +21,122 @@ use std::ops::ControlFlow;
 // are candidates: the time is `O(I r²)` per iteration with r ≤ 64 modes of the prior, the memory
 // `O(I r)`.
 
-/// If both sets have at least this many points, they are matched coarse to fine.
-pub(super) const LARGE: usize = 4000;
-
 /// A run cooled by its residuals ends when the variances of residuals and temperature differ by
 /// less than this fraction. A tenth of it takes a tenth more time for equal errors. A limit of ten
 /// iterations alone leaves volumes three noise widths from the truth
 /// (`--example large_sets -- 20000 volume 0.01 0.2`).
 const STILL: f64 = 1e-3;
 
-impl AnnealedSoftassign {
-    /// Whether sets of these sizes are matched coarse to fine.
-    pub(super) fn is_large<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
-        ws.model.len().min(ws.target.len()) >= LARGE
+/// Minimum number of points of the coarsest sample: fewer represent the shape of a set poorly.
+const COARSEST: usize = 500;
+
+/// First temperature after motions or patterns that agree, in spacings.
+const SEEDED: f64 = 0.4;
+
+impl<const D: usize> Race<'_, D> {
+    /// Matches the samples in turn, each from the result of the coarser one, unless the motions of
+    /// blocks lead to a likely answer. Returns a rival of the answer.
+    pub(super) fn coarse_to_fine(&mut self) -> ControlFlow<(), Option<Doubt>> {
+        let problem = self.problem;
+        let smaller = problem.smaller();
+        let levels = &mut self.runner.levels;
+        levels.model_order.build(&problem.model);
+        levels.target_order.build(&problem.target);
+        if !self.follow_motions()? {
+            self.refine_samples()?;
+            // A run below the noise temperature has lost pairs: repeat it with the temperature set
+            // by the residuals.
+            let run = &self.runner.run;
+            if run.sigma <= problem.limits.clean && run.matched < 0.98 * smaller as f64 {
+                self.refine(following(problem, SEEDED * problem.spacing))?;
+            }
+        }
+        let Runner { run, annealer, .. } = &mut *self.runner;
+        if run.sigma > problem.limits.clean {
+            // Number of rounds in which warp and noise level are updated in turn at the end of
+            // noisy sets.
+            annealer.settle(run, &problem.schedule(FAST), 4);
+        }
+        self.starts = 1;
+        run.energy = f64::INFINITY;
+        run.tail = annealer.tail(0.1 * problem.spacing);
+        self.best.copy_from(run);
+        if !self.is_exact() {
+            let annealer = &mut self.runner.annealer;
+            annealer.evaluate(self.best, problem.slack(), problem.limits.resolution);
+        }
+        self.look_for_rivals()
     }
 
-    /// Matches the samples in turn, each from the result of the coarser one.
-    pub(super) fn solve_coarse_to_fine<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        watch: Watch<'_>,
-    ) -> ControlFlow<()> {
-        let smaller = ws.model.len().min(ws.target.len());
+    /// A run of all points from the motions of blocks. Returns whether its answer is likely.
+    fn follow_motions(&mut self) -> ControlFlow<(), bool> {
+        let problem = self.problem;
+        if !self.has(Mechanism::Motions) {
+            return ControlFlow::Continue(false);
+        }
+        self.runner.levels.base.clone_from(&problem.model);
+        self.enter_level(1);
+        if !self.place_by_motions()? {
+            return ControlFlow::Continue(false);
+        }
+        let sigma = self.warmth();
+        self.refine(following(problem, sigma))?;
+        let Runner { run, annealer, .. } = &mut *self.runner;
+        run.tail = annealer.tail(0.1 * problem.spacing);
+        self.best.copy_from(run);
+        annealer.evaluate(self.best, problem.slack(), problem.limits.resolution);
+        ControlFlow::Continue(self.is_likely())
+    }
+
+    /// Runs of samples that grow to all points.
+    fn refine_samples(&mut self) -> ControlFlow<()> {
+        let problem = self.problem;
         let mut stride = 1;
-        // Minimum size of the coarsest sample: fewer points represent the shape of a set poorly.
-        while smaller / (stride * STEP) >= 500 {
+        while problem.smaller() / (stride * STEP) >= COARSEST {
             stride *= STEP;
         }
-        let mut levels = std::mem::take(&mut ws.levels);
-        levels.model_order.build(&ws.model);
-        levels.target_order.build(&ws.target);
-        let mut flow = ControlFlow::Continue(());
-        if self.has(Mechanism::Motions) {
-            levels.base.clone_from(&ws.model);
-            self.enter(ws, &mut levels, 1);
-            std::mem::swap(&mut ws.levels, &mut levels);
-            let follows = or_stop(self.place_by_motions(ws, watch), &mut flow);
-            std::mem::swap(&mut ws.levels, &mut levels);
-            if follows {
-                let run = self.schedule(Cooling {
-                    sigma: warmth(ws),
-                    least: 1.0,
-                    still: STILL,
-                    ..FAST
-                });
-                flow = refine(ws, run, flow, watch);
-                if ws.gives_up {
-                    flow?;
-                }
-                ws.state.tail = ws.annealer.tail(0.1 * ws.spacing);
-                ws.best.copy_from(&ws.state);
-                ws.annealer
-                    .evaluate(&mut ws.best, self.share, ws.annealer.resolution);
-                if ws.is_likely() {
-                    stride = 0;
-                }
-            }
-        }
-        if stride > 0 {
-            flow = self.coarsest(ws, &mut levels, stride, watch);
-            if ws.gives_up {
-                flow?;
-            }
-        }
+        self.coarsest(stride)?;
         while stride > 1 {
-            // First temperature of a level, in spacings of the coarser level.
-            let sigma = 1.0 * ws.spacing;
+            // First temperature of a level: the spacing of the coarser level.
+            let sigma = self.runner.levels.spacing;
             stride /= STEP;
-            levels.coarse.copy_from(&ws.state);
-            self.enter(ws, &mut levels, stride);
-            levels.extend(&mut ws.annealer, stride, STEP, &mut ws.state);
-            let run = if stride > 1 {
-                self.sampled(ws, sigma)
-            } else if self.has(Mechanism::LargePatterns)
-                && flow.is_continue()
-                && or_stop(
-                    self.follow_sampled_patterns(ws, &mut levels, watch),
-                    &mut flow,
-                )
-            {
-                self.schedule(Cooling {
-                    // First temperature after the block patterns, in spacings.
-                    sigma: 0.4 * ws.spacing,
+            let Runner { run, levels, .. } = &mut *self.runner;
+            levels.coarse.copy_from(run);
+            self.enter_level(stride);
+            let Runner {
+                annealer,
+                run,
+                levels,
+                ..
+            } = &mut *self.runner;
+            levels.extend(annealer, stride, STEP, run);
+            let schedule = if stride > 1 {
+                self.sampled(sigma)
+            } else if self.has(Mechanism::LargePatterns) && self.follow_sampled_patterns()? {
+                problem.schedule(Cooling {
+                    sigma: SEEDED * problem.spacing,
                     ..FAST
                 })
             } else {
-                self.schedule(Cooling {
-                    sigma,
-                    least: 1.0,
-                    // If noise hides the patterns, all points are annealed with the temperature set
-                    // by the residuals.
-                    still: STILL,
-                    ..FAST
-                })
+                // If noise hides the patterns, all points are annealed with the temperature set by
+                // the residuals.
+                following(problem, sigma)
             };
-            flow = refine(ws, run, flow, watch);
-            if ws.gives_up {
-                flow?;
-            }
+            self.refine(schedule)?;
         }
-        // A run below the noise temperature has lost pairs: repeat it with the temperature set by
-        // the residuals.
-        let cold =
-            ws.state.sigma <= ws.annealer.clean_sigma && ws.state.matched < 0.98 * smaller as f64;
-        if cold && stride > 0 {
-            let run = self.schedule(Cooling {
-                sigma: 0.4 * ws.spacing,
-                least: 1.0,
-                still: STILL,
-                ..FAST
-            });
-            flow = refine(ws, run, flow, watch);
-            if ws.gives_up {
-                flow?;
-            }
-        }
-        let schedule = self.schedule(FAST);
-        let noisy = ws.state.sigma > ws.annealer.clean_sigma;
-        if flow.is_continue() && noisy {
-            // Number of rounds in which warp and noise level are updated in turn at the end of
-            // noisy sets.
-            ws.annealer.settle(&mut ws.state, &schedule, 4);
-        }
-        ws.levels = levels;
-        ws.starts = 1;
-        ws.state.energy = f64::INFINITY;
-        ws.state.tail = ws.annealer.tail(0.1 * ws.spacing);
-        ws.best.copy_from(&ws.state);
-        if !self.is_exact(ws) {
-            ws.annealer
-                .evaluate(&mut ws.state, self.share, ws.annealer.resolution);
-            ws.best.copy_from(&ws.state);
-        }
-        flow?;
-        self.look_for_rivals(ws, watch)
+        ControlFlow::Continue(())
     }
 
-    /// Moves `ws.state` onto the field on which the local patterns agree: first the patterns of a
-    /// few points with distant candidates, then those of many points with candidates near that
+    /// Moves the current run onto the field on which the local patterns agree: first the patterns of
+    /// a few points with distant candidates, then those of many points with candidates near that
     /// field. Returns `false` and changes nothing if they do not agree.
-    fn follow_sampled_patterns<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        levels: &mut Levels<D>,
-        watch: Watch<'_>,
-    ) -> ControlFlow<(), bool> {
-        let mut reach = 8.0 * ws.spacing;
+    fn follow_sampled_patterns(&mut self) -> ControlFlow<(), bool> {
+        let spacing = self.problem.spacing;
+        let mut reach = 8.0 * spacing;
         // First stage: number of points whose local patterns are compared, and the distance of
         // their candidates. The distance is in spacings and grows by this factor while the patterns
         // do not agree on a field; its limit is in radii of the model.
-        while !follow_patterns_of(ws, levels, 120, reach.min(MAX_PATTERN_REACH), watch)? {
+        while !self.follow_patterns_of(120, reach.min(MAX_PATTERN_REACH))? {
             if reach >= MAX_PATTERN_REACH {
                 return ControlFlow::Continue(false);
             }
@@ -179,147 +144,127 @@ impl AnnealedSoftassign {
         }
         // Second stage: number of points and reach, in spacings, of the patterns that refine this
         // field.
-        follow_patterns_of(ws, levels, 1000, 4.0 * ws.spacing, watch)
+        self.follow_patterns_of(1000, 4.0 * spacing)
+    }
+
+    /// Moves the current run onto the field that the local patterns of about `points` model points
+    /// agree on. Candidates are at most `reach` away.
+    fn follow_patterns_of(&mut self, points: usize, reach: f64) -> ControlFlow<(), bool> {
+        let problem = self.problem;
+        let Runner {
+            annealer,
+            run,
+            levels,
+            patterns,
+            consensus,
+            ..
+        } = &mut *self.runner;
+        let step = (problem.model.len() / points).max(1);
+        let rows = levels.model_order.order.iter().step_by(step).copied();
+        let sets = (&*run.warped, &*problem.target);
+        if !patterns.propose(rows.clone(), sets, problem.spacing, reach, self.watch)? {
+            return ControlFlow::Continue(false);
+        }
+        levels.model.clear();
+        levels.model.extend(rows.clone().map(|i| problem.model[i]));
+        let coarse = &mut levels.coarse;
+        coarse.base.clear();
+        coarse.base.extend(rows.map(|i| run.base[i]));
+        coarse.warped.clone_from(&coarse.base);
+        levels.sampled.build(&levels.model, SCALES);
+        std::mem::swap(&mut annealer.prior, &mut levels.sampled);
+        consensus.fit(annealer, problem, &levels.model, &patterns.pairs, coarse);
+        std::mem::swap(&mut annealer.prior, &mut levels.sampled);
+        // The patterns are accepted if at least this fraction of them lies within a spacing of one
+        // field. For wrong candidates the fraction is a sixteenth.
+        let (pairs, warped) = (&patterns.pairs, &coarse.warped);
+        let agreed = agreement(&problem.target, pairs, warped, problem.spacing) >= 0.3;
+        if agreed {
+            levels.extend(annealer, 1, step, run);
+        }
+        ControlFlow::Continue(agreed)
     }
 
     /// Sets targets, prior and spacing of a level.
-    fn enter<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        levels: &mut Levels<D>,
-        stride: usize,
-    ) {
-        levels.sample(&ws.model, &ws.target, stride, &mut ws.state);
-        ws.annealer.prior.build(&levels.model, SCALES);
-        ws.annealer.soft.set_targets(&levels.target);
-        ws.annealer.rigid.set(self.transformation, &levels.model);
-        ws.spacing = ws.patterns.typical_spacing(&levels.target);
+    fn enter_level(&mut self, stride: usize) {
+        let Runner {
+            annealer,
+            run,
+            levels,
+            ..
+        } = &mut *self.runner;
+        levels.sample(self.problem, stride, run);
+        annealer.enter(self.problem, &levels.model, &levels.target);
     }
 
     /// Matches the coarsest level from the centroids. If all rotations are allowed, the best of
     /// several starts is taken.
-    fn coarsest<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        levels: &mut Levels<D>,
-        stride: usize,
-        watch: Watch<'_>,
-    ) -> ControlFlow<()> {
+    fn coarsest(&mut self, stride: usize) -> ControlFlow<()> {
+        let problem = self.problem;
         let mut base = Vec::new();
-        let rotations = starts::rotations::<D>(self.rotation).map(Some);
+        let rotations = starts::rotations::<D>(problem.options.rotation).map(Some);
         for rotation in std::iter::once(None).chain(rotations) {
-            let sets = (&*ws.model, &*ws.target);
+            let levels = &mut self.runner.levels;
             match rotation {
-                None => levels.base.clone_from(&ws.model),
-                Some(turn) => starts::moments(sets.0, sets.1, &turn, &mut levels.base),
+                None => levels.base.clone_from(&problem.model),
+                Some(turn) => {
+                    starts::moments(&problem.model, &problem.target, &turn, &mut levels.base);
+                }
             }
-            self.enter(ws, levels, stride);
-            ws.state.warped.clone_from(&ws.state.base);
-            let run = self.sampled(ws, FAST.sigma);
-            refine(ws, run, ControlFlow::Continue(()), watch)?;
-            if self.rotation == Rotation::Limited {
+            self.enter_level(stride);
+            let run = &mut self.runner.run;
+            run.warped.clone_from(&run.base);
+            self.refine(self.sampled(FAST.sigma))?;
+            if problem.options.rotation == Rotation::Limited {
                 return ControlFlow::Continue(());
             }
-            ws.annealer
-                .evaluate(&mut ws.state, self.share, ws.annealer.resolution);
-            if base.is_empty() || ws.state.energy < ws.best.energy {
-                ws.best.copy_from(&ws.state);
+            let Runner {
+                annealer,
+                run,
+                levels,
+                ..
+            } = &mut *self.runner;
+            annealer.evaluate(run, problem.slack(), problem.limits.resolution);
+            if base.is_empty() || run.energy < self.best.energy {
+                self.best.copy_from(run);
                 base.clone_from(&levels.base);
             }
         }
+        let Runner { run, levels, .. } = &mut *self.runner;
         levels.base = base;
-        ws.state.copy_from(&ws.best);
+        run.copy_from(self.best);
         ControlFlow::Continue(())
     }
 
     /// The annealing schedule of a sample.
-    fn sampled<const D: usize>(&self, ws: &SoftassignWorkspace<D>, sigma: f64) -> Schedule {
+    fn sampled(&self, sigma: f64) -> Schedule {
+        let schedule = self.problem.schedule(Cooling { sigma, ..FAST });
         Schedule {
-            // The final temperature of a sample, in its spacings. The points of samples are not
+            // The final temperature of a sample is its spacing. The points of samples are not
             // partners, so a lower temperature resolves nothing. Half as much takes twice the time
             // and cools noisy sets below their noise (`--example large_sets`).
-            floor: 1.0 * ws.spacing,
-            ..self.schedule(Cooling { sigma, ..FAST })
+            floor: schedule.floor.max(self.runner.levels.spacing),
+            ..schedule
         }
     }
+
+    /// Anneals the current run.
+    fn refine(&mut self, schedule: Schedule) -> ControlFlow<()> {
+        let Runner { run, annealer, .. } = &mut *self.runner;
+        run.trace.clear();
+        run.iterations = 0;
+        annealer.run(run, &schedule, self.watch)
+    }
 }
 
-/// One annealing run of a level. If the caller has stopped the search, a single iteration that is not
-/// watched.
-fn refine<const D: usize>(
-    ws: &mut SoftassignWorkspace<D>,
-    schedule: Schedule,
-    flow: ControlFlow<()>,
-    watch: Watch<'_>,
-) -> ControlFlow<()> {
-    ws.state.trace.clear();
-    ws.state.iterations = 0;
-    // In large sets smaller Gaussians are dropped. This changes the positions by a thousandth of
-    // the temperature.
-    ws.annealer.soft.faintest = 1e-4;
-    if flow.is_continue() {
-        return ws.annealer.run(&mut ws.state, &schedule, watch);
-    }
-    let once = Schedule {
-        limit: 1,
-        ..schedule
-    };
-    let silent = &mut || ControlFlow::Continue(());
-    // The silent watch cannot stop the run.
-    let _ = ws.annealer.run(&mut ws.state, &once, silent);
-    flow
-}
-
-/// Moves `ws.state` onto the field that the local patterns of about `points` model points agree on.
-/// Candidates are at most `reach` away.
-fn follow_patterns_of<const D: usize>(
-    ws: &mut SoftassignWorkspace<D>,
-    levels: &mut Levels<D>,
-    points: usize,
-    reach: f64,
-    watch: Watch<'_>,
-) -> ControlFlow<(), bool> {
-    let step = (ws.model.len() / points).max(1);
-    let order = &levels.model_order.order;
-    let rows = order.iter().step_by(step).copied();
-    let (warped, target) = (&ws.state.warped, &*ws.target);
-    if !ws
-        .patterns
-        .propose(rows.clone(), warped, target, reach, watch)?
-    {
-        return ControlFlow::Continue(false);
-    }
-    levels.model.clear();
-    levels.model.extend(rows.clone().map(|i| ws.model[i]));
-    let coarse = &mut levels.coarse;
-    coarse.base.clear();
-    coarse.base.extend(rows.map(|i| ws.state.base[i]));
-    coarse.warped.clone_from(&coarse.base);
-    levels.sampled.build(&levels.model, SCALES);
-    let pairs = &ws.patterns.pairs;
-    std::mem::swap(&mut ws.annealer.prior, &mut levels.sampled);
-    let sets = (&*levels.model, target);
-    ws.consensus
-        .fit(&mut ws.annealer, SCALES, sets, pairs, coarse);
-    std::mem::swap(&mut ws.annealer.prior, &mut levels.sampled);
-    // The patterns are accepted if at least this fraction of them lies within a spacing of one
-    // field. For wrong candidates the fraction is a sixteenth.
-    let agreed = agreement(target, pairs, &coarse.warped, ws.spacing) >= 0.3;
-    if agreed {
-        levels.extend(&mut ws.annealer, 1, step, &mut ws.state);
-    }
-    ControlFlow::Continue(agreed)
-}
-
-/// Whether a start was found. Notes in `flow` that the caller has stopped the search.
-fn or_stop(found: ControlFlow<(), bool>, flow: &mut ControlFlow<()>) -> bool {
-    match found {
-        ControlFlow::Continue(found) => found,
-        ControlFlow::Break(()) => {
-            *flow = ControlFlow::Break(());
-            false
-        }
-    }
+/// The schedule of a run of all points whose temperature follows the residuals.
+fn following<const D: usize>(problem: &Problem<D>, sigma: f64) -> Schedule {
+    problem.schedule(Cooling {
+        sigma,
+        least: 1.0,
+        still: STILL,
+        ..FAST
+    })
 }
 
 /// Fraction of the pairs whose targets lie within `distance` of the model points' positions.
@@ -350,48 +295,41 @@ pub(super) struct Levels<const D: usize> {
     target: Vec<[f64; D]>,
     /// Positions of all model points under the start.
     base: Vec<[f64; D]>,
-    coarse: State<D>,
+    coarse: Run<D>,
     weights: Vec<f64>,
     wanted: Axes<D>,
     /// The prior at the points whose patterns are compared.
     sampled: Prior,
+    /// Spacing of the targets of the current level.
+    spacing: f64,
+    distances: Vec<f64>,
 }
 
 impl<const D: usize> Levels<D> {
     /// Takes the sample of every `stride`-th point (all points in their own order for a stride of
-    /// 1). Also sets the base positions of the sample in `state`.
-    fn sample(
-        &mut self,
-        model: &[[f64; D]],
-        target: &[[f64; D]],
-        stride: usize,
-        state: &mut State<D>,
-    ) {
-        state.base.clear();
+    /// 1). Also sets the base positions of the sample in `run`.
+    fn sample(&mut self, problem: &Problem<D>, stride: usize, run: &mut Run<D>) {
+        let (model, target) = (&problem.model, &problem.target);
+        run.base.clear();
         self.model.clear();
         self.target.clear();
         if stride == 1 {
-            state.base.extend_from_slice(&self.base);
+            run.base.extend_from_slice(&self.base);
             self.model.extend_from_slice(model);
             self.target.extend_from_slice(target);
-            return;
+        } else {
+            let rows = self.model_order.order.iter().step_by(stride);
+            run.base.extend(rows.clone().map(|&i| self.base[i]));
+            self.model.extend(rows.map(|&i| model[i]));
+            let rows = self.target_order.order.iter().step_by(stride);
+            self.target.extend(rows.map(|&j| target[j]));
         }
-        let rows = self.model_order.order.iter().step_by(stride);
-        state.base.extend(rows.clone().map(|&i| self.base[i]));
-        self.model.extend(rows.map(|&i| model[i]));
-        let rows = self.target_order.order.iter().step_by(stride);
-        self.target.extend(rows.map(|&j| target[j]));
+        self.spacing = typical_spacing(&self.target, &mut self.distances);
     }
 
     /// Extends the field of `coarse`, every `step`-th point of the level of this stride, to all
-    /// points of that level. The result is in `state.warped`.
-    fn extend(
-        &mut self,
-        annealer: &mut Annealer<D>,
-        stride: usize,
-        step: usize,
-        state: &mut State<D>,
-    ) {
+    /// points of that level. The result is in `run.warped`.
+    fn extend(&mut self, annealer: &mut Annealer<D>, stride: usize, step: usize, run: &mut Run<D>) {
         let padded = annealer.prior.stride;
         let order = &self.model_order.order;
         let row_of = |coarse: usize| match stride {
@@ -400,8 +338,7 @@ impl<const D: usize> Levels<D> {
         };
         self.weights.clear();
         self.weights.resize(padded, 0.0);
-        self.wanted
-            .fill(padded, state.base.iter().map(|_| [0.0; D]));
+        self.wanted.fill(padded, run.base.iter().map(|_| [0.0; D]));
         for (k, (warped, base)) in self.coarse.warped.iter().zip(&self.coarse.base).enumerate() {
             let row = row_of(k);
             self.weights[row] = 1.0;
@@ -415,10 +352,9 @@ impl<const D: usize> Levels<D> {
             .regression
             .fit(&annealer.prior, &self.weights, &self.wanted, 1e-6);
         let field = &annealer.regression.displacement;
-        state.warped.clear();
-        let rows = state.base.iter().enumerate();
-        state
-            .warped
+        run.warped.clear();
+        let rows = run.base.iter().enumerate();
+        run.warped
             .extend(rows.map(|(i, b)| std::array::from_fn(|d| b[d] + field.0[d][i])));
     }
 }

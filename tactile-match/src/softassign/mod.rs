@@ -12,11 +12,25 @@
 //!   does not confirm itself.
 //! - The covariance of the field has few modes: a fit costs `O(I r²)` with r near 30, leverages
 //!   included.
-//! - Most scenes are easy and end with the first run (`search`). Others get further starts: local
-//!   patterns of dense sets (`patterns`), relaxation labelling (19), (20) over the candidates of
-//!   shape contexts (`correspond`), the moments, and the affine map on which local tuples of points
-//!   agree (`tuples`). The start with the lowest energy is chosen: the negative log-likelihood of
-//!   the targets plus that of the warp under its prior.
+//!
+//! ```text
+//! problem ← both sets in one frame, and the options            problem
+//! for (start, schedule) in starts:                             search
+//!     place the model by the start                             starts, motion, patterns, correspond
+//!     while the temperature falls:                             run
+//!         M ← soft assignment of the predicted positions       assign
+//!         warp ← regression of the soft partners               gaussian_process, rigid
+//!     best ← the run of lowest energy
+//!     stop if best is exact, or noise explains its residuals   fine
+//! look for rivals: turned, mirrored, one lattice step off      rivals
+//! average the warp over the scales of the prior                scales
+//! answer ← pairs, confidences, covariances and doubts of best  confidence
+//! ```
+//!
+//! Most scenes are easy and end with the first run. Others get further starts: local patterns of
+//! dense sets, relaxation labelling (19), (20) over the candidates of shape contexts, the moments,
+//! and the affine map on which local tuples of points agree. The energy is the negative
+//! log-likelihood of the targets plus that of the warp under its prior.
 //!
 //! If the residuals are rounding, the data are clean and matched points move exactly onto their
 //! partners. If the residuals are noise, the warp is averaged over the scales of the prior by their
@@ -36,6 +50,7 @@ mod large;
 mod motion;
 mod options;
 mod patterns;
+mod problem;
 mod result;
 mod rigid;
 mod rivals;
@@ -49,19 +64,13 @@ pub use options::Mechanism;
 pub use options::{AnnealedSoftassign, Outliers, Rotation, Search, Transformation};
 pub use result::SoftassignMatch;
 
-use crate::frame::centre_and_radius;
-use crate::{Doubt, MatchError, MatchedPairs, Matching, StopReason, WarmStart, Watch, error};
+use crate::{MatchError, MatchedPairs, Matching, StopReason, WarmStart, Watch};
 use confidence::Answer;
-use correspond::Correspondence;
-use fine::FineFit;
-use large::Levels;
-use motion::Motions;
 use nalgebra::{Point, SVector, Vector3};
-use patterns::{Consensus, LocalPatterns};
+use problem::Problem;
 use result::Series;
-use run::{Annealer, State};
-use scales::ScaleAverage;
-use starts::Tuples;
+use run::Run;
+use search::{Outcome, Race, Runner};
 use std::ops::ControlFlow;
 
 /// Reusable memory of matches.
@@ -93,94 +102,35 @@ use std::ops::ControlFlow;
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct SoftassignWorkspace<const D: usize> {
-    frame: Frame<D>,
-    model: Vec<[f64; D]>,
-    target: Vec<[f64; D]>,
-    annealer: Annealer<D>,
-    state: State<D>,
-    best: State<D>,
-    /// The result of the block motions.
-    followed: State<D>,
+    problem: Problem<D>,
+    runner: Runner<D>,
+    /// The best run of the last search, and the answer read from it.
+    best: Run<D>,
     answer: Answer<D>,
-    correspondence: Correspondence,
-    patterns: LocalPatterns<D>,
-    consensus: Consensus<D>,
-    tuples: Tuples<D>,
-    scales: ScaleAverage<D>,
-    fine: FineFit<D>,
-    levels: Levels<D>,
-    motions: Motions<D>,
-    /// Vectors from a model point to its neighbours.
-    steps: Vec<SVector<f64, D>>,
-    /// Typical distance of a target to its nearest neighbour.
-    spacing: f64,
-    /// Largest motion allowed.
-    farthest: f64,
-    /// Fraction of points without a partner expected by the caller.
-    expected_share: f64,
-    /// Rows of a set, sorted by their coordinates.
-    rows: Vec<usize>,
-    starts: usize,
-    stopped: bool,
-    /// Whether a search that is stopped ends at once, without an answer.
-    gives_up: bool,
-    /// Whether all rotations are allowed and one maps the model onto itself.
-    symmetric: bool,
-    /// A rival that fits the targets better than the answer but is excluded by the options, and its
-    /// gain.
-    twin: Option<(f64, Doubt)>,
-    /// A step by which the model repeats, if the answer may be off by it.
-    repeats: Option<Doubt>,
-    /// Number of points matched by the best run before the last one.
-    matched_before: f64,
-    /// Why the answer is not reliable.
-    doubt: Option<Doubt>,
 }
 
 impl<const D: usize> SoftassignWorkspace<D> {
-    /// Determines the doubt of the answer, and lowers its confidences accordingly.
-    fn settle_doubt(&mut self) {
-        let smaller = self.model.len().min(self.target.len());
-        // An exact answer fits the targets perfectly.
-        let gain = self.gain().unwrap_or(f64::INFINITY);
-        let share = self.expected_share;
-        let doubt = self.answer.doubt(smaller, share, gain, &self.best);
-        let symmetric = self.symmetric.then_some(Doubt::Symmetric);
-        let twin = self.twin.map(|(_, doubt)| doubt);
-        self.doubt = twin.or(self.repeats).or(doubt).or(symmetric);
-        if let Some(doubt) = self.doubt {
-            self.answer.lower_confidences(doubt, gain);
-        }
+    /// Searches for the answer of the problem. If `watch` stops the search, the answer comes from
+    /// its best run so far.
+    pub(crate) fn solve(&mut self, watch: Watch<'_>) {
+        let mut race = Race::new(&self.problem, &mut self.runner, &mut self.best, watch);
+        let rival = race.go().continue_value();
+        let outcome = race.outcome(rival);
+        self.conclude(outcome);
     }
 
-    /// Log-likelihood gain, per point of the smaller set, of the best answer over points
-    /// distributed uniformly in their bounding box. The prior of the warp is included. `None` if an
-    /// exact first run was compared with nothing.
-    fn gain(&self) -> Option<f64> {
-        let smaller = self.model.len().min(self.target.len()) as f64;
-        let strewn = self.target.len() as f64 * self.annealer.volume.ln();
-        let energy = self.best.energy;
-        energy.is_finite().then(|| (strewn - energy) / smaller)
+    /// The answer of one short run, see [`Race::go_from`].
+    fn solve_from(&mut self, start: &[[f64; D]], sigma: f64) {
+        let mut go = || ControlFlow::Continue(());
+        let mut race = Race::new(&self.problem, &mut self.runner, &mut self.best, &mut go);
+        let rival = race.go_from(start, sigma).continue_value();
+        let outcome = race.outcome(rival);
+        self.conclude(outcome);
     }
 
-    /// Stores two sets, in the units of the frame.
-    fn take(
-        &mut self,
-        model: &[Point<f64, D>],
-        target: &[Point<f64, D>],
-    ) -> Result<(), MatchError> {
-        error::point_sets(model, target)?;
-        if model.len().min(target.len()) >= large::LARGE {
-            error::spread_out("model", model, &mut self.rows)?;
-            error::spread_out("target", target, &mut self.rows)?;
-        }
-        let frame = Frame::new(model, target);
-        self.frame = frame;
-        self.model.clear();
-        self.model.extend(model.iter().map(|p| frame.model(p)));
-        self.target.clear();
-        self.target.extend(target.iter().map(|p| frame.target(p)));
-        Ok(())
+    fn conclude(&mut self, outcome: Outcome) {
+        let (problem, runner, best) = (&self.problem, &mut self.runner, &self.best);
+        self.answer.conclude(problem, runner, best, outcome);
     }
 }
 
@@ -230,8 +180,8 @@ impl AnnealedSoftassign {
         target: &[Point<f64, D>],
         mut watch: impl FnMut() -> ControlFlow<()>,
     ) -> Result<SoftassignMatch<'w, D>, MatchError> {
-        workspace.take(model, target)?;
-        self.search_in(workspace, &mut watch)?;
+        workspace.problem.take(*self, model, target)?;
+        workspace.search(&mut watch)?;
         Ok(SoftassignMatch::of(workspace))
     }
 }
@@ -245,17 +195,22 @@ impl AnnealedSoftassign {
         target: &[Point<f64, D>],
         watch: Watch<'_>,
     ) -> Result<Matching<D>, MatchError> {
-        let mut workspace = SoftassignWorkspace {
-            gives_up: true,
-            ..SoftassignWorkspace::default()
-        };
-        workspace.take(model, target)?;
-        self.search_in(&mut workspace, watch)?;
-        if workspace.stopped {
+        let mut workspace = SoftassignWorkspace::default();
+        workspace.problem.take(*self, model, target)?;
+        let SoftassignWorkspace {
+            problem,
+            runner,
+            best,
+            ..
+        } = &mut workspace;
+        let mut race = Race::new(problem, runner, best, watch);
+        let Some(rival) = race.go().continue_value() else {
             let mut found = Matching::from_pairs(model, target, &[])?;
             found.report.stop = StopReason::Cancelled;
             return Ok(found);
-        }
+        };
+        let outcome = race.outcome(Some(rival));
+        workspace.conclude(outcome);
         Ok(SoftassignMatch::of(&workspace).to_matching(model))
     }
 
@@ -282,104 +237,6 @@ impl AnnealedSoftassign {
         series.pairs(pairs);
         Ok(())
     }
-}
-
-/// Coordinates are clamped to this number of radii, which is as good as infinity. The square is
-/// still finite in single precision.
-const FARTHEST: f64 = 1e12;
-
-/// The centroids and the unit of length inside the matcher.
-#[derive(Clone, Copy, Debug)]
-struct Frame<const D: usize> {
-    model: SVector<f64, D>,
-    target: SVector<f64, D>,
-    scale: f64,
-    /// Radius of the target, relative to the scale.
-    target_radius: f64,
-}
-
-impl<const D: usize> Default for Frame<D> {
-    fn default() -> Self {
-        Self {
-            model: SVector::zeros(),
-            target: SVector::zeros(),
-            scale: 1.0,
-            target_radius: 1.0,
-        }
-    }
-}
-
-impl<const D: usize> Frame<D> {
-    /// The frame of two sets. For a model without extent the radius of `target` is used, or 1 if
-    /// the target has no extent either.
-    fn new(model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Self {
-        let sets = [model, target].map(bulk);
-        // A radius below the rounding of the coordinates is noise: such a set counts as one point.
-        let extended = |(centre, radius): &(SVector<f64, D>, f64)| {
-            *radius > 8.0 * f64::EPSILON * centre.amax()
-        };
-        let scale = sets
-            .iter()
-            .find(|set| extended(set))
-            .map_or(1.0, |set| set.1);
-        Self {
-            model: sets[0].0,
-            target: sets[1].0,
-            scale,
-            target_radius: sets[1].1 / scale,
-        }
-    }
-
-    /// Offset from a model point in the frame to its position among the targets without motion.
-    fn still(&self) -> [f64; D] {
-        self.inward(self.model - self.target)
-    }
-
-    /// Converts a model point into the frame.
-    fn model(&self, point: &Point<f64, D>) -> [f64; D] {
-        self.inward(point.coords - self.model)
-    }
-
-    /// Converts a target point into the frame.
-    fn target(&self, point: &Point<f64, D>) -> [f64; D] {
-        self.inward(point.coords - self.target)
-    }
-
-    fn inward(&self, offset: SVector<f64, D>) -> [f64; D] {
-        std::array::from_fn(|k| (offset[k] / self.scale).clamp(-FARTHEST, FARTHEST))
-    }
-
-    /// Converts a warped point, given among the targets, into the units of the caller.
-    fn outward(&self, point: &[f64; D]) -> Point<f64, D> {
-        Point::from(std::array::from_fn(|k| {
-            point[k] * self.scale + self.target[k]
-        }))
-    }
-}
-
-/// Points farther from the centre than this multiple of the median do not belong to the bulk of a
-/// set. Points that fill a ball, a box or their surfaces have no such outliers.
-const BULK: f64 = 6.0;
-
-/// Centroid and root mean square radius of the bulk of a set, so that a point at a thousand times
-/// the size of the others does not change them.
-fn bulk<const D: usize>(points: &[Point<f64, D>]) -> (SVector<f64, D>, f64) {
-    let (mut centre, mut radius) = centre_and_radius(points);
-    let mut kept: Vec<Point<f64, D>> = Vec::new();
-    // Several rounds, because the farthest outliers hide nearer ones.
-    for _ in 0..4 {
-        let within = |p: &&Point<f64, D>, limit: f64| (p.coords - centre).norm() <= limit;
-        // Half of the points lie farther than the median.
-        let limit = BULK * radius / 4.0;
-        let near = points.iter().filter(|p| within(p, limit / BULK)).count();
-        if !(radius.is_finite() && 2 * near > points.len()) {
-            break; // the bulk reaches farther than a quarter of the radius
-        }
-        kept.clear();
-        kept.extend(points.iter().filter(|p| within(p, limit)));
-        (centre, radius) = centre_and_radius(&kept);
-    }
-    (centre, radius)
 }
 
 /// Mean of points already in the frame.

@@ -11,10 +11,12 @@ use rayon::prelude::*;
 #[cfg(feature = "rayon")]
 use std::ops::ControlFlow;
 
-/// Points without a partner: their expected fraction, and a factor for each side.
+/// Points without a partner: their expected fraction, the volume they fill, and a factor for each
+/// side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Slack {
     pub share: f64,
+    pub volume: f64,
     pub model: f64,
     pub target: f64,
 }
@@ -372,7 +374,7 @@ impl AnnealedSoftassign {
         self.without != Some(mechanism)
     }
 
-    pub(super) fn slack(&self) -> Slack {
+    pub(super) fn slack(&self, volume: f64) -> Slack {
         let (model, target) = match self.outliers {
             Outliers::Both => (1.0, 1.0),
             Outliers::Model => (1.0, RARE),
@@ -381,6 +383,7 @@ impl AnnealedSoftassign {
         };
         Slack {
             share: self.share,
+            volume,
             model,
             target,
         }

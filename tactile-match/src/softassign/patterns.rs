@@ -1,7 +1,9 @@
 //! Local patterns: the warped neighbours of a point identify its target. Also contains the robust
 //! fit of doubtful pairs.
 
-use super::run::{Annealer, State};
+use super::problem::Problem;
+use super::run::{Annealer, Run};
+use super::search::SCALES;
 use super::{difference, squared_distance};
 use crate::Watch;
 use crate::gaussian_process::{Axes, Prior, PriorScales};
@@ -50,17 +52,17 @@ pub(super) struct Candidate {
 
 impl<const D: usize> LocalPatterns<D> {
     /// Finds `pairs` for some model rows, in their order, for model points that a first warp has
-    /// moved to `warped`. Candidates are at most `reach` away. Returns `false` if the sets have no
+    /// moved to `warped`. `spacing` is that of the targets. Candidates are at most `reach` away. Returns `false` if the sets have no
     /// meaningful spacing.
     pub(super) fn propose(
         &mut self,
         rows: impl Iterator<Item = usize>,
-        warped: &[[f64; D]],
-        target: &[[f64; D]],
+        (warped, target): (&[[f64; D]], &[[f64; D]]),
+        spacing: f64,
         reach: f64,
         watch: Watch<'_>,
     ) -> ControlFlow<(), bool> {
-        self.spacing = self.typical_spacing(target);
+        self.spacing = spacing;
         if !(self.spacing > 0.0 && self.spacing < reach) {
             return ControlFlow::Continue(false);
         }
@@ -77,33 +79,6 @@ impl<const D: usize> LocalPatterns<D> {
         }
         self.weigh();
         ControlFlow::Continue(true)
-    }
-
-    /// Median nearest-neighbour distance of the targets, over a sample.
-    pub(super) fn typical_spacing(&mut self, target: &[[f64; D]]) -> f64 {
-        // Sample of the points that determines the spacing.
-        let step = target.len().div_ceil(101);
-        self.distances.clear();
-        for i in (0..target.len()).step_by(step) {
-            let others = target.iter().enumerate().filter(|&(j, _)| j != i);
-            let nearest = others
-                .map(|(_, t)| squared_distance(t, &target[i]))
-                .fold(f64::INFINITY, f64::min);
-            self.distances.push((nearest, i));
-        }
-        let middle = self.distances.len() / 2;
-        let by_distance = |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0);
-        let spacing = self
-            .distances
-            .select_nth_unstable_by(middle, by_distance)
-            .1
-            .0;
-        // A single point has no neighbour.
-        if spacing.is_finite() {
-            spacing.sqrt()
-        } else {
-            0.0
-        }
     }
 
     /// Finds the nearest neighbours of model point `i`, as offsets from it.
@@ -379,23 +354,23 @@ pub(super) struct Consensus<const D: usize> {
 
 impl<const D: usize> Consensus<D> {
     /// Robust regression of the likeliest pairs, a target and probability for each model point. The
-    /// result is in `state.warped`. Pairs far from the common warp lose weight from round to round.
+    /// result is in `run.warped`. Pairs far from the common warp lose weight from round to round.
     pub(super) fn fit(
         &mut self,
         annealer: &mut Annealer<D>,
-        scales: PriorScales,
-        (model, target): (&[[f64; D]], &[[f64; D]]),
+        problem: &Problem<D>,
+        model: &[[f64; D]],
         pairs: &[(usize, f64)],
-        state: &mut State<D>,
+        run: &mut Run<D>,
     ) {
         self.prior.build(
             model,
             PriorScales {
                 bending: 0.05,
-                ..scales
+                ..SCALES
             },
         );
-        self.take(target, pairs, &state.base);
+        self.take(&problem.target, pairs, &run.base);
         let mut variance = 1.0;
         for round in 0..FIT_ROUNDS {
             let prior = if round < FIT_ROUNDS / 2 {
@@ -406,12 +381,11 @@ impl<const D: usize> Consensus<D> {
             annealer
                 .regression
                 .fit(prior, &self.weights, &self.wanted, f64::max(variance, 1e-4));
-            variance = self.reweigh(&annealer.regression.displacement, variance, annealer.volume);
+            variance = self.reweigh(&annealer.regression.displacement, variance, problem.volume);
         }
-        for (i, warped) in state.warped.iter_mut().enumerate() {
-            *warped = std::array::from_fn(|k| {
-                state.base[i][k] + annealer.regression.displacement.0[k][i]
-            });
+        for (i, warped) in run.warped.iter_mut().enumerate() {
+            *warped =
+                std::array::from_fn(|k| run.base[i][k] + annealer.regression.displacement.0[k][i]);
         }
     }
 

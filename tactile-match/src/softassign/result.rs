@@ -1,13 +1,12 @@
 //! The result of a match: its warp, and the state kept along a series of targets.
 
 use super::assign::Blocks;
-use super::large::LARGE;
-use super::{AnnealedSoftassign, Frame, SoftassignWorkspace, mean, squared_distance};
+use super::problem::{Frame, LARGE};
+use super::{AnnealedSoftassign, SoftassignWorkspace, mean, squared_distance};
 use crate::frame::centre_and_radius;
 use crate::interpolation::{Interpolation, follows, through};
 use crate::{
-    FittedTransformation, Judgement, MatchError, MatchReport, MatchedPairs, Matching, StopReason,
-    error,
+    FittedTransformation, MatchError, MatchReport, MatchedPairs, Matching, Transformation, error,
 };
 use nalgebra::{Point, SMatrix};
 use std::ops::ControlFlow;
@@ -72,30 +71,21 @@ pub struct SoftassignMatch<'w, const D: usize> {
 impl<'w, const D: usize> SoftassignMatch<'w, D> {
     /// The match in the workspace.
     pub(super) fn of(workspace: &'w SoftassignWorkspace<D>) -> Self {
-        let scale = workspace.frame.scale;
+        let answer = &workspace.answer;
         Self {
             workspace,
-            assignment: &workspace.answer.assignment,
-            confidence: &workspace.answer.confidence,
-            report: MatchReport {
-                stop: stop_reason(workspace),
-                iterations: workspace.best.iterations,
-                starts: workspace.starts,
-                residual: workspace.answer.residual * scale,
-                sigma: workspace.fine.sigma.unwrap_or(workspace.best.sigma) * scale,
-                judgement: workspace.doubt.map_or(Judgement::Sure, Judgement::Doubtful),
-            },
+            assignment: &answer.assignment,
+            confidence: &answer.confidence,
+            report: answer.report.clone(),
         }
     }
 
     /// The warped model points.
     pub fn warped(&self) -> impl ExactSizeIterator<Item = Point<f64, D>> + use<'w, D> {
-        let workspace = self.workspace;
-        workspace
-            .answer
-            .warped
-            .iter()
-            .map(|w| workspace.frame.outward(w))
+        let SoftassignWorkspace {
+            problem, answer, ..
+        } = self.workspace;
+        answer.warped.iter().map(|w| problem.frame.outward(w))
     }
 
     /// The match with its warp, soft matches and covariances. `model` must be the points that were
@@ -107,21 +97,25 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
 
     /// Like [`to_matching`](Self::to_matching), with the factorised system of the model's spline.
     fn interpolated(&self, model: &[Point<f64, D>], spline: &ModelSpline<D>) -> Matching<D> {
-        let workspace = self.workspace;
-        let (answer, frame) = (&workspace.answer, &workspace.frame);
+        let SoftassignWorkspace {
+            problem,
+            answer,
+            best,
+            ..
+        } = self.workspace;
         let mut warped: Vec<Point<f64, D>> = self.warped().collect();
         let warp = spline.through(&mut warped);
         let matched = (0..model.len()).filter(|&i| answer.assignment[i].is_some());
-        let (rigid, sigma) = (&workspace.annealer.rigid, self.report.sigma);
-        let transformation = rigid
-            .is_active()
-            .then(|| FittedTransformation::of(model, &warped, matched, sigma, rigid.grows()))
+        let grows = problem.options.transformation != Transformation::Rigid;
+        let sigma = self.report.sigma;
+        let transformation = (!problem.bends())
+            .then(|| FittedTransformation::of(model, &warped, matched, sigma, grows))
             .flatten();
-        let mut taken = vec![false; workspace.target.len()];
+        let mut taken = vec![false; problem.target.len()];
         let partners = answer.assignment.iter().flatten();
         partners.for_each(|&j| taken[j] = true);
         let unmatched = (0..model.len()).filter(|&i| answer.assignment[i].is_none());
-        let square = frame.scale * frame.scale;
+        let square = problem.frame.scale * problem.frame.scale;
         let covariance = |v: &f64| SMatrix::from_diagonal_element(v * square);
         Matching {
             warp,
@@ -133,32 +127,17 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
             unmatched_target: (0..taken.len()).filter(|&j| !taken[j]).collect(),
             displacement_covariance: answer.variance.iter().map(covariance).collect(),
             transformation,
-            energy: workspace.best.trace.clone(),
+            energy: best.trace.clone(),
             report: self.report.clone(),
         }
     }
 
     /// Soft matches of a model point, sorted by target row.
     fn soft_row(&self, i: usize) -> Vec<(usize, f64)> {
-        let entries = self.workspace.annealer.soft.entries(i);
+        let entries = self.workspace.runner.annealer.soft.entries(i);
         let mut row: Vec<_> = entries.filter(|&(_, p)| p > FAINTEST).collect();
         row.sort_unstable_by_key(|entry| entry.0);
         row
-    }
-}
-
-fn stop_reason<const D: usize>(workspace: &SoftassignWorkspace<D>) -> StopReason {
-    match () {
-        () if workspace.stopped => StopReason::Cancelled,
-        // The lowest temperature is reached, to rounding.
-        () if workspace.best.sigma <= 1.000_001 * workspace.annealer.least_sigma
-            && !workspace.fine.found
-            && workspace.doubt.is_none() =>
-        {
-            StopReason::Exact
-        }
-        () if workspace.best.settled => StopReason::Converged,
-        () => StopReason::IterationLimit,
     }
 }
 
@@ -472,15 +451,16 @@ impl AnnealedSoftassign {
         if last.is_empty() {
             return Ok(false);
         }
-        workspace.take(model, target)?;
-        let frame = workspace.frame;
+        workspace.problem.take(*self, model, target)?;
+        let problem = &workspace.problem;
+        let frame = problem.frame;
         start.clear();
         start.extend(last.iter().map(|p| frame.target(p)));
         // The first temperature is this multiple of the difference of the sets in position and
         // size.
-        let warmth = 2.0 * apart(start, &workspace.target);
-        self.solve_from(workspace, start, warmth);
-        let noise = (2.0 * *sigma / frame.scale).max(workspace.annealer.clean_sigma);
+        let warmth = 2.0 * apart(start, &problem.target);
+        let noise = (2.0 * *sigma / frame.scale).max(problem.limits.clean);
+        workspace.solve_from(start, warmth);
         let found = workspace.answer.assignment.iter().flatten().count();
         // A match is made anew if it finds partners for less than this fraction of the last number,
         // or if its residuals exceed this multiple of the last ones.

@@ -1,6 +1,7 @@
 //! Rigid motions, similarities and affine maps in place of a smooth warp.
 
-use super::{FARTHEST, Transformation, in_space};
+use super::problem::FARTHEST;
+use super::{Transformation, in_space};
 use crate::gaussian_process::{Axes, Regression};
 use nalgebra::{Matrix3, Point, SMatrix, SVector, SymmetricEigen, Vector3};
 use tactile_tps::{Affine, Warp};
@@ -33,11 +34,6 @@ impl<const D: usize> RigidFit<D> {
 
     pub(super) fn is_active(&self) -> bool {
         self.transformation != Transformation::Smooth
-    }
-
-    /// Whether lengths may change.
-    pub(super) fn grows(&self) -> bool {
-        self.transformation != Transformation::Rigid
     }
 
     /// Writes the displacements from `base` under the least-squares motion, and their variances,

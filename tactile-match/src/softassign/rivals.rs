@@ -1,10 +1,9 @@
 //! Rivals of an answer: the model rotated, mirrored or shifted by a step of its lattice.
 
-use super::run::{Cooling, State};
-use super::search::{FAST, bounding_volume};
-use super::{AnnealedSoftassign, Mechanism, Rotation, SoftassignWorkspace};
-use super::{difference, mean, squared, squared_distance, starts};
-use crate::{Doubt, Watch};
+use super::run::Cooling;
+use super::search::{FAST, Race, Runner};
+use super::{Mechanism, Rotation, difference, mean, squared, starts};
+use crate::Doubt;
 use nalgebra::{SMatrix, SVector};
 use std::ops::ControlFlow;
 
@@ -71,171 +70,155 @@ fn mirror<const D: usize>() -> SMatrix<f64, D, D> {
     mirror
 }
 
-impl AnnealedSoftassign {
+impl<const D: usize> Race<'_, D> {
     /// Searches for a better answer among the rotated, mirrored and shifted models. An allowed
-    /// rival replaces the answer. Others that are better or equally good are stored in `ws.twin`
-    /// and `ws.repeats`.
-    pub(super) fn look_for_rivals<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        watch: Watch<'_>,
-    ) -> ControlFlow<()> {
-        let few = ws.model.len().min(ws.target.len()) < 4 * D;
-        if few || ws.best.trace.is_empty() || !self.has(Mechanism::Rivals) {
-            return ControlFlow::Continue(()); // any few points have many nearly equal partners
+    /// rival replaces the best run. Returns another that is better or equally good.
+    pub(super) fn look_for_rivals(&mut self) -> ControlFlow<(), Option<Doubt>> {
+        let few = self.problem.smaller() < 4 * D;
+        if few || self.best.trace.is_empty() || !self.has(Mechanism::Rivals) {
+            return ControlFlow::Continue(None); // any few points have many nearly equal partners
         }
-        let spacing = ws.mean_spacing();
-        ws.put_where_looked_up(spacing);
-        if ws.best.sigma >= RESOLVED * spacing {
-            self.look_for_turns(ws, spacing, watch)?;
+        let spacing = self.problem.model_spacing();
+        self.put_where_looked_up(spacing);
+        if self.best.sigma >= RESOLVED * spacing {
+            let twin = self.look_for_turns(spacing)?;
+            if twin.is_some() {
+                return ControlFlow::Continue(twin);
+            }
         }
-        if ws.twin.is_none() {
-            self.look_for_steps(ws, spacing, watch)?;
-        }
-        ControlFlow::Continue(())
+        self.look_for_steps(spacing)
     }
 
     /// Searches for a better answer among the rotated and mirrored models.
-    fn look_for_turns<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        spacing: f64,
-        watch: Watch<'_>,
-    ) -> ControlFlow<()> {
+    fn look_for_turns(&mut self, spacing: f64) -> ControlFlow<(), Option<Doubt>> {
         let still = Moved::by_turn(SMatrix::identity());
-        let own = ws.distance_after(&still, &ws.linear_part(), spacing, NEAR);
+        let own = self.distance_after(&still, &self.linear_part(), spacing, NEAR);
         let Some(own) = own.filter(|&own| own > RESOLVED * spacing) else {
-            return ControlFlow::Continue(());
+            return ControlFlow::Continue(None);
         };
+        let mut twin: Option<(f64, Doubt)> = None;
         for (mirrored, reflection) in [(false, SMatrix::identity()), (true, mirror())] {
-            let linear = ws.linear_part(); // of the answer, which a rotated model may have replaced
-            let allowed = self.rotation == Rotation::Any && !mirrored;
+            let linear = self.linear_part(); // of the answer, which a rotated model may have replaced
+            let allowed = self.problem.options.rotation == Rotation::Any && !mirrored;
             let nearer = if allowed { NEARER } else { CLEARLY_NEARER };
             let mut best = (nearer * own, None);
             for turn in starts::rotations::<D>(Rotation::Any).map(|turn| turn * reflection) {
                 let moved = Moved::by_turn(turn);
-                let found = ws.distance_after(&moved, &linear, spacing, NEAR);
+                let found = self.distance_after(&moved, &linear, spacing, NEAR);
                 if let Some(distance) = found.filter(|&distance| distance < best.0) {
                     best = (distance, Some(moved));
                 }
             }
             let Some(moved) = best.1 else { continue };
-            ws.start_from(&moved, &linear);
+            self.start_from(&moved, &linear);
             // At a higher temperature points would leave their first partners.
-            let gain = self.run_rival(ws, 0.3 * spacing, &moved, watch)?;
-            let points = ws.model.len() as f64;
+            let gain = self.run_rival(0.3 * spacing, &moved)?;
+            let points = self.problem.model.len() as f64;
             let chance = if allowed {
                 CLEAR_GAIN[1] * points
             } else {
                 CLEAR_CHANCE * (D as f64 * points).sqrt()
             };
             let least = CLEAR_GAIN[0] + chance;
-            if gain > ws.twin.map_or(least, |(last, _)| last) {
-                ws.twin = match (mirrored, allowed) {
+            if gain > twin.map_or(least, |(last, _)| last) {
+                twin = match (mirrored, allowed) {
                     (true, _) => Some((gain, Doubt::Mirrored)),
                     (false, false) => Some((gain, Doubt::Turned)),
                     (false, true) => {
-                        self.accept(ws);
+                        self.accept();
                         None
                     }
                 };
             }
         }
-        ControlFlow::Continue(())
+        ControlFlow::Continue(twin.map(|(_, doubt)| doubt))
     }
 
     /// Searches for lattice steps: the answer of least motion replaces one that fits the targets no
-    /// better. Stores in `ws.repeats` a step that fits equally well and is within reach.
-    fn look_for_steps<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        spacing: f64,
-        watch: Watch<'_>,
-    ) -> ControlFlow<()> {
-        ws.find_steps(spacing);
+    /// better. Returns a step that fits equally well and is within reach.
+    fn look_for_steps(&mut self, spacing: f64) -> ControlFlow<(), Option<Doubt>> {
+        let problem = self.problem;
+        self.find_steps(spacing);
         // Each round shifts the answer by one step towards the unmoved model.
         for _ in 0..4 {
-            let linear = ws.linear_part();
+            let linear = self.linear_part();
             let still = Moved::by_turn(SMatrix::identity());
-            let Some(own) = ws.distance_after(&still, &linear, spacing, NEAR_STEP) else {
+            let Some(own) = self.distance_after(&still, &linear, spacing, NEAR_STEP) else {
                 break;
             };
             let most = AS_NEAR * own + ROUNDING * spacing;
             let mut least: Option<(f64, Moved<D>)> = None;
-            for at in 0..ws.steps.len() {
-                let step = ws.steps[at];
+            for at in 0..self.runner.steps.len() {
+                let step = self.runner.steps[at];
                 let moved = Moved::by_step(step);
-                let found = ws.distance_after(&moved, &linear, spacing, NEAR_STEP);
+                let found = self.distance_after(&moved, &linear, spacing, NEAR_STEP);
                 if found.is_none_or(|distance| distance > most) {
                     continue;
                 }
-                let motion = ws.motion_after(&(linear * step));
+                let motion = self.motion_after(&(linear * step));
                 if least.as_ref().is_none_or(|(other, _)| motion < *other) {
                     least = Some((motion, moved));
                 }
             }
             let Some((motion, moved)) = least else { break };
-            let own = ws.motion_after(&SVector::zeros());
+            let own = self.motion_after(&SVector::zeros());
             if motion < own {
-                ws.start_from(&moved, &linear);
-                let gain = self.run_rival(ws, 0.2 * spacing, &moved, watch)?;
+                self.start_from(&moved, &linear);
+                let gain = self.run_rival(0.2 * spacing, &moved)?;
                 // The edges of a view cost each answer some points.
-                if gain > -CLEAR_GAIN[0] && !ws.state.far {
-                    self.accept(ws);
+                if gain > -CLEAR_GAIN[0] && !self.runner.run.far {
+                    self.accept();
                     continue;
                 }
             }
             let step = linear * moved.step;
-            if motion < REACH * own && motion <= ws.farthest && !ws.is_whole(&step) {
+            if motion < REACH * own && motion <= problem.farthest && !self.is_whole(&step) {
                 let mut outward = [0.0; 3];
-                (0..D).for_each(|k| outward[k] = step[k] * ws.frame.scale);
-                ws.repeats = Some(Doubt::Repeats { step: outward });
+                (0..D).for_each(|k| outward[k] = step[k] * problem.frame.scale);
+                return ControlFlow::Continue(Some(Doubt::Repeats { step: outward }));
             }
             break;
         }
-        ControlFlow::Continue(())
+        ControlFlow::Continue(None)
     }
 
-    /// Runs from `ws.state`. Returns its gain over the answer.
-    fn run_rival<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        sigma: f64,
-        moved: &Moved<D>,
-        watch: Watch<'_>,
-    ) -> ControlFlow<(), f64> {
-        if ws.annealer.rigid.is_active() {
+    /// Anneals the current run. Returns its gain over the best one.
+    fn run_rival(&mut self, sigma: f64, moved: &Moved<D>) -> ControlFlow<(), f64> {
+        let problem = self.problem;
+        let (limits, transformation) = (problem.limits, problem.options.transformation);
+        if !problem.bends() {
+            let Runner { run, annealer, .. } = &mut *self.runner;
             let turned = |p: &[f64; D]| <[f64; D]>::from(moved.apply(p));
-            ws.state.base.clear();
-            ws.state.base.extend(ws.model.iter().map(turned));
-            ws.annealer.rigid.set(self.transformation, &ws.state.base);
+            run.base.clear();
+            run.base.extend(problem.model.iter().map(turned));
+            annealer.rigid.set(transformation, &run.base);
         }
-        let flow = self.anneal_only(ws, Cooling { sigma, ..FOLLOW }, watch);
-        ws.state.tail = ws.annealer.tail(0.1 * ws.spacing);
-        ws.state.far = ws.is_far(&ws.state);
-        let energy = ws.best.energy;
-        let clean = ws.annealer.clean_sigma;
-        let resolution = if ws.best.sigma.max(ws.state.sigma) <= clean {
-            clean
+        let flow = self.anneal_only(Cooling { sigma, ..FOLLOW });
+        let Runner { run, annealer, .. } = &mut *self.runner;
+        run.tail = annealer.tail(0.1 * problem.spacing);
+        run.far = problem.is_far(&run.warped);
+        let energy = self.best.energy;
+        let resolution = if self.best.sigma.max(run.sigma) <= limits.clean {
+            limits.clean
         } else {
-            ws.annealer.least_sigma
+            limits.least
         };
-        for state in [&mut ws.state, &mut ws.best] {
-            ws.annealer.evaluate(state, self.share, resolution);
+        for either in [&mut *run, &mut *self.best] {
+            annealer.evaluate(either, problem.slack(), resolution);
         }
-        let gain = ws.best.energy - ws.state.energy;
-        ws.best.energy = energy;
-        ws.annealer.rigid.set(self.transformation, &ws.model);
+        let gain = self.best.energy - run.energy;
+        self.best.energy = energy;
+        annealer.rigid.set(transformation, &problem.model);
         flow?;
         ControlFlow::Continue(gain)
     }
 
-    /// Accepts the last run as the answer.
-    fn accept<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
-        let state = &mut ws.state;
-        ws.annealer
-            .evaluate(state, self.share, ws.annealer.resolution);
-        ws.best.copy_from(state);
+    /// Accepts the current run as the best.
+    fn accept(&mut self) {
+        let problem = self.problem;
+        let Runner { run, annealer, .. } = &mut *self.runner;
+        annealer.evaluate(run, problem.slack(), problem.limits.resolution);
+        self.best.copy_from(run);
     }
 }
 
@@ -276,16 +259,11 @@ impl<const D: usize> Moved<D> {
     }
 }
 
-impl<const D: usize> SoftassignWorkspace<D> {
-    /// Distance between neighbours of a model that fills its bounding box.
-    pub(super) fn mean_spacing(&self) -> f64 {
-        (bounding_volume(&self.model, 1.0) / self.model.len() as f64).powf(1.0 / D as f64)
-    }
-
+impl<const D: usize> Race<'_, D> {
     /// Whether a rotation maps the model onto itself, within the resolution of the answer, and fits
     /// the targets equally well. The answer may then be off by this rotation.
     pub(super) fn is_symmetric(&mut self) -> bool {
-        let spacing = self.mean_spacing();
+        let spacing = self.problem.model_spacing();
         let reach = (3.0 * self.best.sigma).min(0.25 * spacing) / spacing;
         self.put_where_looked_up(spacing);
         let linear = self.linear_part();
@@ -305,8 +283,14 @@ impl<const D: usize> SoftassignWorkspace<D> {
 
     /// Builds the look-up cells of model and targets.
     fn put_where_looked_up(&mut self, spacing: f64) {
-        self.patterns.model.build(&self.model, spacing);
-        self.patterns.targets.build(&self.target, spacing);
+        self.runner
+            .patterns
+            .model
+            .build(&self.problem.model, spacing);
+        self.runner
+            .patterns
+            .targets
+            .build(&self.problem.target, spacing);
     }
 
     /// Median distance from the sample to the targets after the map. `None` if too many points then
@@ -318,23 +302,28 @@ impl<const D: usize> SoftassignWorkspace<D> {
         spacing: f64,
         reach: f64,
     ) -> Option<f64> {
-        let step = self.model.len().div_ceil(SAMPLE);
-        let sampled = self.model.len() / step;
+        let step = self.problem.model.len().div_ceil(SAMPLE);
+        let sampled = self.problem.model.len() / step;
         let mut misses = (moved.misses(reach) * sampled as f64) as usize;
-        let distances = &mut self.annealer.sums;
+        let distances = &mut self.runner.annealer.sums;
         distances.clear();
-        for p in self.model.iter().step_by(step) {
+        for p in self.problem.model.iter().step_by(step) {
             let turned = moved.apply(p);
-            let near = self.patterns.model.nearest(&turned.into(), reach * spacing);
+            let near = self
+                .runner
+                .patterns
+                .model
+                .nearest(&turned.into(), reach * spacing);
             let Some(k) = near else {
                 misses = misses.checked_sub(1)?;
                 continue;
             };
             let place = SVector::from(self.best.warped[k])
-                + linear * (turned - SVector::from(self.model[k]));
-            let found = self.patterns.targets.nearest(&place.into(), spacing);
-            distances
-                .push(found.map_or(spacing, |j| (SVector::from(self.target[j]) - place).norm()));
+                + linear * (turned - SVector::from(self.problem.model[k]));
+            let found = self.runner.patterns.targets.nearest(&place.into(), spacing);
+            distances.push(found.map_or(spacing, |j| {
+                (SVector::from(self.problem.target[j]) - place).norm()
+            }));
         }
         let middle = distances.len() / 2;
         Some(*distances.select_nth_unstable_by(middle, f64::total_cmp).1)
@@ -344,50 +333,37 @@ impl<const D: usize> SoftassignWorkspace<D> {
     fn find_steps(&mut self, spacing: f64) {
         let square = |p: &[f64; D]| squared(p);
         let from = self
+            .problem
             .model
             .iter()
             .min_by(|a, b| square(a).total_cmp(&square(b)));
         let from = from.copied().unwrap_or([0.0; D]);
-        let offsets = self.model.iter().map(|p| difference(p, &from));
+        let offsets = self.problem.model.iter().map(|p| difference(p, &from));
         let others = offsets.filter(|o| squared(o) > (SHORTEST_STEP * spacing).powi(2));
         let shortest = others
             .clone()
             .map(|o| squared(&o))
             .fold(f64::INFINITY, f64::min);
         let near = others.filter(|o| squared(o) <= LONGEST_STEP * LONGEST_STEP * shortest);
-        self.steps.clear();
-        self.steps.extend(near.map(SVector::from));
+        self.runner.steps.clear();
+        self.runner.steps.extend(near.map(SVector::from));
     }
 
     /// Root mean square motion of the model under the answer, shifted by one more step.
     fn motion_after(&self, step: &SVector<f64, D>) -> f64 {
-        let still = SVector::from(self.frame.still());
-        let rows = self.model.iter().zip(&self.best.warped);
+        let still = SVector::from(self.problem.frame.still());
+        let rows = self.problem.model.iter().zip(&self.best.warped);
         let motion = |(p, w): (&[f64; D], &[f64; D])| {
             let motion = SVector::from(*w) - SVector::from(*p) - still + step;
             motion.norm_squared()
         };
-        (rows.map(motion).sum::<f64>() / self.model.len() as f64).sqrt()
-    }
-
-    /// Whether more than a tenth of the points moves farther than allowed.
-    pub(super) fn is_far(&self, state: &State<D>) -> bool {
-        if self.farthest.is_infinite() {
-            return false;
-        }
-        let still = self.frame.still();
-        let rows = self.model.iter().zip(&state.warped);
-        let square = |(p, w): &(&[f64; D], &[f64; D])| {
-            squared_distance(w, &std::array::from_fn(|k| p[k] + still[k]))
-        };
-        let far = rows.filter(|row| square(row) > self.farthest * self.farthest);
-        10 * far.count() > self.model.len()
+        (rows.map(motion).sum::<f64>() / self.problem.model.len() as f64).sqrt()
     }
 
     /// Whether both sets contain the same points, all in view. If so, nearly all are matched, and
     /// their bounding box has changed in a way that it would not for two views of more points.
     fn is_whole(&self, step: &SVector<f64, D>) -> bool {
-        let larger = self.model.len().max(self.target.len()) as f64;
+        let larger = self.problem.model.len().max(self.problem.target.len()) as f64;
         let sides = |points: &[[f64; D]]| -> [f64; D] {
             std::array::from_fn(|k| {
                 let range = points.iter().fold((f64::MAX, f64::MIN), |(low, high), p| {
@@ -396,7 +372,7 @@ impl<const D: usize> SoftassignWorkspace<D> {
                 range.1 - range.0
             })
         };
-        let (model, target) = (sides(&self.model), sides(&self.target));
+        let (model, target) = (sides(&self.problem.model), sides(&self.problem.target));
         let least = SAME_BOX[0] * step.norm() + SAME_BOX[1] * self.best.sigma;
         let changed = (0..D).any(|k| (model[k] - target[k]).abs() > least);
         self.best.matched >= COMPLETE * larger && changed
@@ -404,10 +380,10 @@ impl<const D: usize> SoftassignWorkspace<D> {
 
     /// Affine part of the answer.
     fn linear_part(&self) -> SMatrix<f64, D, D> {
-        let (from, to) = (mean(&self.model), mean(&self.best.warped));
+        let (from, to) = (mean(&self.problem.model), mean(&self.best.warped));
         let mut gram = SMatrix::<f64, D, D>::identity() * 1e-9;
         let mut cross = SMatrix::<f64, D, D>::zeros();
-        for (p, w) in self.model.iter().zip(&self.best.warped) {
+        for (p, w) in self.problem.model.iter().zip(&self.best.warped) {
             let p = SVector::from(*p) - SVector::from(from);
             let w = SVector::from(*w) - SVector::from(to);
             gram += p * p.transpose();
@@ -416,21 +392,21 @@ impl<const D: usize> SoftassignWorkspace<D> {
         cross * gram.try_inverse().unwrap_or_else(SMatrix::zeros)
     }
 
-    /// Moves `state` to the answer for the mapped model.
+    /// Moves the current run to the answer for the mapped model.
     fn start_from(&mut self, moved: &Moved<D>, linear: &SMatrix<f64, D, D>) {
-        let spacing = self.mean_spacing();
-        let (from, to) = (mean(&self.model), mean(&self.best.warped));
+        let spacing = self.problem.model_spacing();
+        let (from, to) = (mean(&self.problem.model), mean(&self.best.warped));
         let to = SVector::from(to) - linear * SVector::from(from);
-        let state = &mut self.state;
-        state.base.clear();
-        state.warped.clear();
-        for p in &self.model {
+        let run = &mut self.runner.run;
+        run.base.clear();
+        run.warped.clear();
+        for p in &self.problem.model {
             let turned = moved.apply(p);
             let base = linear * turned + to;
-            state.base.push(base.into());
-            let near = self.patterns.model.nearest(&turned.into(), spacing);
-            state.warped.push(near.map_or(base.into(), |k| {
-                let offset = linear * (turned - SVector::from(self.model[k]));
+            run.base.push(base.into());
+            let near = self.runner.patterns.model.nearest(&turned.into(), spacing);
+            run.warped.push(near.map_or(base.into(), |k| {
+                let offset = linear * (turned - SVector::from(self.problem.model[k]));
                 (SVector::from(self.best.warped[k]) + offset).into()
             }));
         }

@@ -51,9 +51,9 @@ pub(super) struct Schedule {
     pub slack: Slack,
 }
 
-/// State of a run.
+/// A run: where it is, and how well it fits.
 #[derive(Clone, Debug, Default)]
-pub(super) struct State<const D: usize> {
+pub(super) struct Run<const D: usize> {
     /// Prior positions of the model points.
     pub base: Vec<[f64; D]>,
     /// Warped positions of the model points.
@@ -82,7 +82,7 @@ pub(super) struct State<const D: usize> {
     pub ambiguity: f64,
 }
 
-impl<const D: usize> State<D> {
+impl<const D: usize> Run<D> {
     pub(super) fn copy_from(&mut self, other: &Self) {
         self.base.clone_from(&other.base);
         self.warped.clone_from(&other.warped);
@@ -102,14 +102,6 @@ pub(super) struct Annealer<const D: usize> {
     pub regression: Regression<D>,
     /// Replaces the regression if the warp must not bend.
     pub rigid: RigidFit<D>,
-    /// Volume of the targets' bounding box.
-    pub volume: f64,
-    /// Residuals up to this value are the truncation error of the prior's factor.
-    pub clean_sigma: f64,
-    /// The lowest temperature.
-    pub least_sigma: f64,
-    /// Resolution at which runs are compared.
-    pub resolution: f64,
     pub weights: Vec<f64>,
     pub residuals: Axes<D>,
     pub predicted: Vec<[f64; D]>,
@@ -148,7 +140,7 @@ impl<const D: usize> Annealer<D> {
         sweeps: usize,
         sharpness: f64,
     ) {
-        let weight = self.slack_weight(warped.len(), variance, slack.share);
+        let weight = slack_weight::<D>(warped.len(), variance, slack);
         let [rows, columns] = [slack.model, slack.target]
             .map(|side| (side * weight).powf(sharpness).max(1e-30) as f32);
         let gaussian = Gaussian {
@@ -161,27 +153,11 @@ impl<const D: usize> Annealer<D> {
         self.soft.sum_moments(warped);
     }
 
-    /// `(2πσ²)^{D/2}` times the density of outliers.
-    fn slack_weight(&self, points: usize, variance: f64, share: f64) -> f64 {
-        let density = share / (1.0 - share) * points as f64 / self.volume;
-        (TAU * variance).powf(0.5 * D as f64) * density
-    }
-
-    /// Fraction of a point's weight that the slack takes if the residual is noise at the current
-    /// temperature.
-    ///
-    /// A pair with the residual r keeps about `1 − w exp(r²/4σ²)` if the slack has the weight w on
-    /// both sides, and the mean of the exponential is `2^{D/2}`.
-    fn lost_to_slack(&self, points: usize, variance: f64, slack: Slack) -> f64 {
-        let weight = self.slack_weight(points, 2.0 * variance, slack.share);
-        slack.model.max(slack.target) * weight
-    }
-
     /// Alternates until the temperature no longer falls. `watch` is called after each iteration
     /// and may stop the run.
     pub(super) fn run(
         &mut self,
-        state: &mut State<D>,
+        state: &mut Run<D>,
         schedule: &Schedule,
         watch: Watch<'_>,
     ) -> ControlFlow<()> {
@@ -197,7 +173,7 @@ impl<const D: usize> Annealer<D> {
             state.iterations += 1;
             state.trace.push(self.free_energy(state, variance));
             watch()?;
-            let floor = self.floor(schedule).powi(2);
+            let floor = schedule.floor.powi(2);
             // Temperatures (variances) below this are cold: a tenth of the model's radius.
             if variance < 0.01 && state.matched < schedule.collapse {
                 // The temperature fell below the noise: points lose their partners and do not
@@ -213,7 +189,7 @@ impl<const D: usize> Annealer<D> {
             // If nearly all points are matched and decided, and no part is displaced, residuals
             // above the temperature are noise. At lower temperatures points would lose their
             // partners.
-            let lost = self.lost_to_slack(state.warped.len(), variance, schedule.slack);
+            let lost = lost_to_slack::<D>(state.warped.len(), variance, schedule.slack);
             noise_found |= schedule.cooling.least < 1.0
                 && residual > variance
                 && state.matched >= schedule.partners * (0.99 - lost)
@@ -252,8 +228,8 @@ impl<const D: usize> Annealer<D> {
     /// `state`. Returns how undecided they are, see [`ambiguity`](Self::ambiguity).
     pub(super) fn restore(
         &mut self,
-        state: &State<D>,
-        scratch: &mut State<D>,
+        state: &Run<D>,
+        scratch: &mut Run<D>,
         schedule: &Schedule,
     ) -> f64 {
         scratch.copy_from(state);
@@ -264,11 +240,11 @@ impl<const D: usize> Annealer<D> {
 
     /// Alternates `rounds` of expectation and maximisation with a free noise level, starting from
     /// `state`.
-    pub(super) fn settle(&mut self, state: &mut State<D>, schedule: &Schedule, rounds: usize) {
+    pub(super) fn settle(&mut self, state: &mut Run<D>, schedule: &Schedule, rounds: usize) {
         self.predicted.clone_from(&state.warped);
         for _ in 0..rounds {
             let residual = self.step(state, schedule, state.sigma * state.sigma);
-            state.sigma = (residual + self.open()).sqrt().max(self.floor(schedule));
+            state.sigma = (residual + self.open()).sqrt().max(schedule.floor);
             self.predicted.clone_from(&state.warped);
         }
     }
@@ -281,16 +257,11 @@ impl<const D: usize> Annealer<D> {
         variances.map(|(w, v)| w * v).sum::<f64>() / total.max(1e-9)
     }
 
-    /// The lowest temperature.
-    fn floor(&self, schedule: &Schedule) -> f64 {
-        schedule.floor.max(self.least_sigma)
-    }
-
     /// One soft assignment and one fit. Returns the residual variance.
     ///
     /// Distances are computed from the prediction by the matches of the *other* points, so that a
     /// wrong match does not confirm itself.
-    fn step(&mut self, state: &mut State<D>, schedule: &Schedule, variance: f64) -> f64 {
+    fn step(&mut self, state: &mut Run<D>, schedule: &Schedule, variance: f64) -> f64 {
         let predicted = std::mem::take(&mut self.predicted);
         self.assign(
             &predicted,
@@ -332,7 +303,7 @@ impl<const D: usize> Annealer<D> {
     }
 
     /// Fits the warp to the moments of the soft assignment about the predicted positions.
-    fn fit(&mut self, state: &State<D>, variance: f64) {
+    fn fit(&mut self, state: &Run<D>, variance: f64) {
         let stride = self.prior.stride;
         let rows = self
             .predicted
@@ -364,7 +335,7 @@ impl<const D: usize> Annealer<D> {
 
     /// The annealed energy per model point: distances under M, over the temperature, plus the
     /// penalty of the warp.
-    fn free_energy(&self, state: &State<D>, variance: f64) -> f64 {
+    fn free_energy(&self, state: &Run<D>, variance: f64) -> f64 {
         let spread = &self.soft.moments.spread;
         let data = spread.iter().sum::<f64>() / (2.0 * variance);
         (data + 0.5 * self.regression.penalty()) / state.warped.len() as f64
@@ -376,7 +347,10 @@ impl<const D: usize> Annealer<D> {
     /// The targets are a mixture of Gaussians about the warped points and of uniform outliers,
     /// whose fraction is estimated. Residuals below `resolution` are raised to it, so that an exact
     /// fit does not win by an infinite margin.
-    pub(super) fn evaluate(&mut self, state: &mut State<D>, mut share: f64, resolution: f64) {
+    pub(super) fn evaluate(&mut self, state: &mut Run<D>, slack: Slack, resolution: f64) {
+        let Slack {
+            mut share, volume, ..
+        } = slack;
         let variance = state.sigma.max(resolution).powi(2);
         let (n, m) = (state.warped.len(), self.soft.targets());
         let gaussian = n as f64 * (TAU * variance).powf(0.5 * D as f64);
@@ -384,20 +358,20 @@ impl<const D: usize> Annealer<D> {
             variance,
             sharpness: 1.0,
         };
-        let least = FAINTER * LEAST_SHARE * gaussian / self.volume;
+        let least = FAINTER * LEAST_SHARE * gaussian / volume;
         self.soft.affinities(&state.warped, kernel, least);
         self.soft.column_totals(&mut self.sums);
         let sums = &self.sums[..m];
         let density = 1.0 / gaussian;
         // Fixed-point iterations for the fraction of outliers.
         for _ in 0..8 {
-            let outlier = share / self.volume;
+            let outlier = share / volume;
             let outliers = sums
                 .iter()
                 .map(|s| outlier / ((1.0 - share) * density * s + outlier));
             share = (outliers.sum::<f64>() / m as f64).clamp(LEAST_SHARE, 0.95);
         }
-        let (gauss, outlier) = ((1.0 - share) * density, share / self.volume);
+        let (gauss, outlier) = ((1.0 - share) * density, share / volume);
         let data: f64 = sums.iter().map(|s| -(gauss * s + outlier).ln()).sum();
         if self.rigid.is_active() {
             // All motions are equally likely a priori, and equally well determined from any start.
@@ -417,6 +391,21 @@ impl<const D: usize> Annealer<D> {
         state.energy =
             data + 0.5 * (self.regression.penalty() + D as f64 * self.regression.log_det);
     }
+}
+
+/// `(2πσ²)^{D/2}` times the density of outliers.
+fn slack_weight<const D: usize>(points: usize, variance: f64, slack: Slack) -> f64 {
+    let density = slack.share / (1.0 - slack.share) * points as f64 / slack.volume;
+    (TAU * variance).powf(0.5 * D as f64) * density
+}
+
+/// Fraction of a point's weight that the slack takes if the residual is noise at the current
+/// temperature.
+///
+/// A pair with the residual r keeps about `1 − w exp(r²/4σ²)` if the slack has the weight w on both
+/// sides, and the mean of the exponential is `2^{D/2}`.
+fn lost_to_slack<const D: usize>(points: usize, variance: f64, slack: Slack) -> f64 {
+    slack.model.max(slack.target) * slack_weight::<D>(points, 2.0 * variance, slack)
 }
 
 // Signs that part of a set is shifted by one point: residuals that exceed the noise of the others,

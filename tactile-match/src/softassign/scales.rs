@@ -1,6 +1,6 @@
 //! The average over the scales of the prior, weighted by their evidence.
 
-use super::run::State;
+use super::run::Run;
 use crate::Watch;
 use crate::gaussian_process::{Axes, Prior, PriorScales, Request};
 use crate::kernels::{cholesky, combine, normal_equations, solve};
@@ -55,7 +55,7 @@ impl<const D: usize> ScaleAverage<D> {
         &mut self,
         request: Request<'_, D>,
         model: &[[f64; D]],
-        state: &mut State<D>,
+        state: &mut Run<D>,
         (variance, affine): (f64, f64),
         likely: bool,
         watch: Watch<'_>,
@@ -132,7 +132,7 @@ impl<const D: usize> ScaleAverage<D> {
     }
 
     /// Moves the points to the accumulated mean, and sets `spread`.
-    fn place(&mut self, state: &mut State<D>) {
+    fn place(&mut self, state: &mut Run<D>) {
         self.spread.clear();
         for (i, warped) in state.warped.iter_mut().enumerate() {
             let mut square = self.square[i] / self.total;

@@ -1,19 +1,24 @@
-//! The search: a list of starts, each annealed on its own schedule and compared by evidence, until
-//! an answer leaves no doubt.
+//! The search: a race of runs from a list of starts, compared by evidence, until an answer leaves
+//! no doubt.
 //!
 //! Most scenes are easy and end with the first, fast run. If its answer does not fit exactly and
 //! noise does not explain its residuals, further starts follow, from the cheapest to the most
-//! expensive. The answer with the lowest energy is chosen. For noisy scenes the scales of the prior
-//! are then averaged.
+//! expensive. The run with the lowest energy wins. For noisy scenes the scales of the prior are then
+//! averaged.
 
 use super::confidence::{self, MIN_TELLING_GAIN};
-use super::run::{Cooling, Schedule};
-use super::{
-    AnnealedSoftassign, BULK, Mechanism, Rotation, Search, SoftassignWorkspace, Transformation,
-    starts,
-};
-use crate::Watch;
+use super::correspond::Correspondence;
+use super::fine::FineFit;
+use super::large::Levels;
+use super::motion::Motions;
+use super::patterns::{Consensus, LocalPatterns};
+use super::problem::Problem;
+use super::run::{Annealer, Cooling, Run, Schedule};
+use super::scales::ScaleAverage;
+use super::starts::Tuples;
+use super::{Mechanism, Rotation, Search, starts};
 use crate::gaussian_process::PriorScales;
+use crate::{Doubt, Watch};
 use nalgebra::{SMatrix, SVector};
 use std::ops::ControlFlow;
 
@@ -23,10 +28,6 @@ pub(super) const SCALES: PriorScales = PriorScales {
     bending: 0.35,
     affine: 0.5,
 };
-/// A set of this many points is dense: an exact answer need not be complete, and local tuples are
-/// tried first.
-const MIN_DENSE_POINTS: usize = 500;
-
 /// Largest distance of targets with which the pattern of a point is compared, in radii of the
 /// model.
 pub(super) const MAX_PATTERN_REACH: f64 = 0.25;
@@ -137,564 +138,537 @@ enum Start<const D: usize> {
     Tuples,
 }
 
-impl AnnealedSoftassign {
-    pub(crate) fn solve<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>, watch: Watch<'_>) {
-        self.begin(ws);
-        let flow = if self.is_large(ws) {
-            self.solve_coarse_to_fine(ws, watch)
-        } else {
-            self.prepare(ws);
-            match self.search {
-                Search::Near => self.run(ws, Start::Centred, NEAR, watch),
-                Search::Thorough => self.search(ws, watch),
-            }
-        };
-        ws.stopped = flow.is_break();
-        if ws.stopped && ws.gives_up {
-            return;
+/// Working memory of the runs. No run depends on what another has left here.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Runner<const D: usize> {
+    pub annealer: Annealer<D>,
+    /// The current run.
+    pub run: Run<D>,
+    /// The best run from the motions of blocks, while the other starts are tried.
+    followed: Run<D>,
+    correspondence: Correspondence,
+    pub patterns: LocalPatterns<D>,
+    pub consensus: Consensus<D>,
+    tuples: Tuples<D>,
+    pub scales: ScaleAverage<D>,
+    pub fine: FineFit<D>,
+    pub levels: Levels<D>,
+    motions: Motions<D>,
+    /// Vectors from a model point to its neighbours.
+    pub steps: Vec<SVector<f64, D>>,
+}
+
+impl<const D: usize> Runner<D> {
+    /// Prepares prior and targets for all points.
+    fn prepare(&mut self, problem: &Problem<D>) {
+        self.annealer
+            .enter(problem, &problem.model, &problem.target);
+    }
+}
+
+impl<const D: usize> Annealer<D> {
+    /// Prepares prior and targets for these points of the sets.
+    pub(super) fn enter(&mut self, problem: &Problem<D>, model: &[[f64; D]], target: &[[f64; D]]) {
+        // In large sets smaller Gaussians are dropped. This changes the positions by a thousandth of
+        // the temperature.
+        self.soft.faintest = if problem.is_large() { 1e-4 } else { 1e-6 };
+        self.soft.set_targets(target);
+        self.prior.build(model, SCALES);
+        self.rigid.set(problem.options.transformation, model);
+    }
+}
+
+/// What a search has found, beside its best run.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Outcome {
+    /// Number of runs.
+    pub starts: usize,
+    /// Whether the caller stopped it.
+    pub stopped: bool,
+    /// Another answer that fits as well, or better but is excluded by the options.
+    pub rival: Option<Doubt>,
+    /// Whether all rotations are allowed and one maps the model onto itself.
+    pub symmetric: bool,
+}
+
+/// A search: a race of runs. The best so far wins.
+pub(super) struct Race<'a, const D: usize> {
+    pub problem: &'a Problem<D>,
+    pub runner: &'a mut Runner<D>,
+    /// The best run so far.
+    pub best: &'a mut Run<D>,
+    pub watch: Watch<'a>,
+    /// Number of runs.
+    pub starts: usize,
+    /// Number of points matched by the best run before the last one.
+    matched_before: f64,
+}
+
+impl<'a, const D: usize> Race<'a, D> {
+    pub(super) fn new(
+        problem: &'a Problem<D>,
+        runner: &'a mut Runner<D>,
+        best: &'a mut Run<D>,
+        watch: Watch<'a>,
+    ) -> Self {
+        runner.scales.spread.clear();
+        (best.matched, best.energy) = (0.0, f64::INFINITY);
+        (best.noisy, best.far) = (false, false);
+        Self {
+            problem,
+            runner,
+            best,
+            watch,
+            starts: 0,
+            matched_before: 0.0,
         }
-        if ws.stopped && ws.starts == 0 {
-            // Stopped before the first iteration, which is then the answer.
-            let _ = self.run(ws, Start::Centred, NEAR, &mut || ControlFlow::Break(()));
+    }
+
+    /// Searches for the best run, which stays in `best`. Returns a rival of it.
+    pub(super) fn go(&mut self) -> ControlFlow<(), Option<Doubt>> {
+        if self.problem.is_large() {
+            return self.coarse_to_fine();
         }
-        self.conclude(ws);
+        self.runner.prepare(self.problem);
+        match self.problem.options.search {
+            Search::Near => self.run(Start::Centred, NEAR).map_continue(|()| None),
+            Search::Thorough => self.search(),
+        }
     }
 
     /// One short run from `start`. Its first temperature is `sigma`, limited to the range between
     /// the lowest at which points still change partners and that of sets near each other.
-    pub(super) fn solve_from<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
+    pub(super) fn go_from(
+        &mut self,
         start: &[[f64; D]],
         sigma: f64,
-    ) {
-        self.begin(ws);
-        self.prepare(ws);
-        ws.state.base.clone_from(&ws.model);
-        ws.state.warped.clear();
-        ws.state.warped.extend_from_slice(start);
-        let cooling = Cooling {
-            sigma: sigma.clamp(0.03, NEAR.sigma),
-            ..NEAR
-        };
-        // The silent watch cannot stop the run.
-        let _ = self.anneal(ws, cooling, &mut || ControlFlow::Continue(()));
-        self.conclude(ws);
+    ) -> ControlFlow<(), Option<Doubt>> {
+        self.runner.prepare(self.problem);
+        let run = &mut self.runner.run;
+        run.base.clone_from(&self.problem.model);
+        run.warped.clear();
+        run.warped.extend_from_slice(start);
+        let sigma = sigma.clamp(0.03, NEAR.sigma);
+        self.anneal(Cooling { sigma, ..NEAR })
+            .map_continue(|()| None)
     }
 
-    /// Resets the results.
-    fn begin<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
-        ws.annealer.soft.faintest = 1e-6;
-        ws.annealer.volume = bounding_volume(&ws.target, ws.frame.target_radius);
-        let sparser = if ws.model.len() < ws.target.len() {
-            mean_spacing(ws.annealer.volume, &ws.model)
-        } else {
-            mean_spacing(ws.annealer.volume, &ws.target)
-        };
-        ws.annealer.set_resolution(sparser);
-        ws.spacing = ws.patterns.typical_spacing(&ws.target);
-        ws.farthest = self.largest_motion / ws.frame.scale;
-        (ws.best.matched, ws.twin, ws.repeats) = (0.0, None, None);
-        ws.scales.spread.clear();
-        (ws.best.noisy, ws.best.far) = (false, false);
-        (ws.starts, ws.stopped) = (0, false);
-        ws.best.energy = f64::INFINITY;
-    }
-
-    /// Prepares prior and targets for all points.
-    fn prepare<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
-        ws.annealer.prior.build(&ws.model, SCALES);
-        ws.annealer.soft.set_targets(&ws.target);
-        ws.annealer.rigid.set(self.transformation, &ws.model);
-    }
-
-    /// Reads the answer from the best run.
-    fn conclude<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
-        ws.expected_share = self.share;
-        let noisy = ws.best.noisy || self.resolve(ws);
-        if ws.starts > 1 || noisy || !self.is_exact(ws) {
+    /// Prepares the reading of the answer: soft matches and regression become those of the best run.
+    /// `rival` is `None` if the search was stopped.
+    pub(super) fn outcome(mut self, rival: Option<Option<Doubt>>) -> Outcome {
+        let stopped = rival.is_none();
+        if stopped && self.starts == 0 {
+            // Stopped before a run ended: a single iteration is the answer.
+            self.runner.prepare(self.problem);
+            let mut stop = || ControlFlow::Break(());
+            let mut once = Race::new(self.problem, self.runner, self.best, &mut stop);
+            let sigma = NEAR.sigma.min(self.problem.spacing);
+            let _ = once.run(Start::Centred, Cooling { sigma, ..NEAR });
+            self.starts = 1;
+        }
+        let noisy = self.best.noisy || self.resolve();
+        if self.starts > 1 || noisy || !self.is_exact() {
             // Soft matches and regression are those of the last run, which may not be the best run.
-            let schedule = self.schedule(Cooling {
-                sigma: ws.best.sigma,
-                ..SLOW
-            });
-            ws.annealer.restore(&ws.best, &mut ws.state, &schedule);
+            let schedule = self.schedule_at_end();
+            let Runner { annealer, run, .. } = &mut *self.runner;
+            annealer.restore(self.best, run, &schedule);
         }
-        let slack = self.slack();
-        let spread = &ws.scales.spread;
-        ws.answer.read(
-            &mut ws.annealer,
-            &ws.best,
-            &ws.target,
-            slack,
-            spread,
-            self.without,
-        );
-        ws.answer.finish(
-            self.outliers,
-            &ws.target,
-            &ws.model,
-            (ws.frame.still(), ws.farthest),
-        );
-        if ws.best.noisy {
-            ws.answer.variance.clone_from(&ws.fine.variance);
+        let any = self.problem.options.rotation == Rotation::Any;
+        Outcome {
+            starts: self.starts,
+            stopped,
+            rival: rival.flatten(),
+            symmetric: any && self.is_symmetric(),
         }
-        ws.symmetric = self.rotation == Rotation::Any && ws.is_symmetric();
-        ws.settle_doubt();
     }
 
-    /// Tries the starts in turn until the best answer leaves no doubt, then averages over the
-    /// scales of the prior.
-    fn search<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        watch: Watch<'_>,
-    ) -> ControlFlow<()> {
-        let dense = ws.model.len().min(ws.target.len()) >= MIN_DENSE_POINTS;
-        let follows = dense && self.has(Mechanism::Motions);
+    /// Tries the starts in turn until the best run leaves no doubt, then averages over the scales of
+    /// the prior. Returns a rival of the answer.
+    fn search(&mut self) -> ControlFlow<(), Option<Doubt>> {
+        let follows = self.problem.is_dense() && self.has(Mechanism::Motions);
         if follows {
-            self.run(ws, Start::Moved, MOVED, watch)?;
+            self.run(Start::Moved, MOVED)?;
         }
-        if ws.starts == 0 || !self.is_followed(ws, watch)? {
-            // Further starts would continue from this answer even if it is wrong.
-            std::mem::swap(&mut ws.followed, &mut ws.best);
-            (ws.best.energy, ws.best.matched) = (f64::INFINITY, 0.0);
-            let runs = std::mem::take(&mut ws.starts);
-            self.try_starts(ws, watch)?;
-            if runs > 0 && !self.is_exact(ws) && ws.followed.energy < ws.best.energy {
-                std::mem::swap(&mut ws.followed, &mut ws.best);
+        if self.starts == 0 || !self.is_followed()? {
+            // Further starts would continue from this run even if it is wrong.
+            std::mem::swap(&mut self.runner.followed, self.best);
+            (self.best.energy, self.best.matched) = (f64::INFINITY, 0.0);
+            let runs = std::mem::take(&mut self.starts);
+            self.try_starts()?;
+            if runs > 0 && !self.is_exact() && self.runner.followed.energy < self.best.energy {
+                std::mem::swap(&mut self.runner.followed, self.best);
             }
-            ws.starts += runs;
+            self.starts += runs;
         }
-        self.look_for_rivals(ws, watch)?;
-        let noisy = ws.best.sigma > ws.annealer.clean_sigma;
-        if noisy && !ws.best.noisy && self.has(Mechanism::Scales) && !ws.annealer.rigid.is_active()
-        {
-            self.average_scales(ws, watch)?;
+        let rival = self.look_for_rivals()?;
+        let noisy = self.best.sigma > self.problem.limits.clean;
+        if noisy && !self.best.noisy && self.has(Mechanism::Scales) && self.problem.bends() {
+            self.average_scales()?;
         }
-        ControlFlow::Continue(())
+        ControlFlow::Continue(rival)
+    }
+
+    pub(super) fn has(&self, mechanism: Mechanism) -> bool {
+        self.problem.options.has(mechanism)
     }
 
     /// Whether a run from the motions of blocks is the answer. It is if it is exact, or if the set
-    /// is dense, the answer is likely, and the local patterns of the points do not lead to a better
+    /// is dense, the run is likely, and the local patterns of the points do not lead to a better
     /// one.
-    fn is_followed<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        watch: Watch<'_>,
-    ) -> ControlFlow<(), bool> {
-        if self.is_exact(ws) || !ws.is_likely() {
-            return ControlFlow::Continue(self.is_exact(ws));
+    fn is_followed(&mut self) -> ControlFlow<(), bool> {
+        if self.is_exact() || !self.is_likely() {
+            return ControlFlow::Continue(self.is_exact());
         }
-        let energy = ws.best.energy;
-        let seeded = seeded(ws.spacing);
-        self.run(ws, Start::Patterns, seeded, watch)?;
+        let energy = self.best.energy;
+        self.run(Start::Patterns, seeded(self.problem.spacing))?;
         // Swaps of a few close points change the energy by less than this per point.
-        let least = energy - 0.01 * ws.model.len() as f64;
-        ControlFlow::Continue(ws.best.energy >= least && ws.is_likely())
+        let least = energy - 0.01 * self.problem.model.len() as f64;
+        ControlFlow::Continue(self.best.energy >= least && self.is_likely())
     }
 
-    /// Tries the starts that do not use the unmoved sets, until an answer leaves no doubt.
-    fn try_starts<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        watch: Watch<'_>,
-    ) -> ControlFlow<()> {
-        self.run(ws, Start::Centred, FAST, watch)?;
-        if !ws.best.settled && ws.best.iterations >= self.max_iterations {
+    /// Tries the starts that do not use the unmoved sets, until the best run leaves no doubt.
+    fn try_starts(&mut self) -> ControlFlow<()> {
+        self.run(Start::Centred, FAST)?;
+        if !self.best.settled && self.best.iterations >= self.problem.options.max_iterations {
             return ControlFlow::Continue(()); // the limit would stop every further start as well
         }
-        let dense = ws.model.len().min(ws.target.len()) >= MIN_DENSE_POINTS;
-        let limited = self.rotation == Rotation::Limited;
-        let seeded = seeded(ws.spacing);
-        let patterns =
-            (dense && self.has(Mechanism::Patterns)).then_some((Start::Patterns, seeded));
-        // Repeats from the improved field as long as more points are matched.
-        let patterns = [patterns; 6].into_iter();
-        let first = [
-            (!dense && self.has(Mechanism::Motions)).then_some((Start::Moved, MOVED)),
-            (dense && self.has(Mechanism::Tuples)).then_some((Start::Tuples, seeded)),
-            self.has(Mechanism::Reheat).then_some((Start::Best, REHEAT)),
-            self.has(Mechanism::Slow).then_some((Start::Centred, SLOW)),
-            (!dense && self.has(Mechanism::Tuples)).then_some((Start::Tuples, seeded)),
-            (limited && self.has(Mechanism::Labelling)).then_some((Start::Labelling, LABELLED)),
-        ];
-        let rotations = starts::rotations::<D>(self.rotation)
-            .filter(|_| self.has(Mechanism::Moments))
-            .map(|rotation| (Start::Moments(rotation), SLOW));
-        let last = self
-            .has(Mechanism::LastReheat)
-            .then_some((Start::Best, REHEAT));
-        let first = patterns.chain(first).flatten();
-        for (start, cooling) in first.chain(rotations).chain(last) {
-            if self.is_done(ws) || self.resolve(ws) {
-                break;
+        for (start, cooling) in further_starts(self.problem) {
+            if self.is_done() || self.resolve() {
+                return ControlFlow::Continue(());
             }
-            self.run(ws, start, cooling, watch)?;
+            self.run(start, cooling)?;
         }
-        let open = !dense && self.has(Mechanism::Open);
-        if open && is_cold(ws) && !self.is_done(ws) && !self.resolve(ws) {
-            let near = Cooling {
-                sigma: 0.3 * ws.spacing,
-                ..OPEN
-            };
-            self.run(ws, Start::Best, near, watch)?;
-            if is_cold(ws) {
-                self.run(ws, Start::Centred, OPEN, watch)?;
+        let open = !self.problem.is_dense() && self.has(Mechanism::Open);
+        if open && self.is_cold() && !self.is_done() && !self.resolve() {
+            let sigma = 0.3 * self.problem.spacing;
+            self.run(Start::Best, Cooling { sigma, ..OPEN })?;
+            if self.is_cold() {
+                self.run(Start::Centred, OPEN)?;
             }
         }
         ControlFlow::Continue(())
     }
 
     /// Runs from a start. Does nothing if the sets have no such start.
-    fn run<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        start: Start<D>,
-        cooling: Cooling,
-        watch: Watch<'_>,
-    ) -> ControlFlow<()> {
-        if !self.place(ws, start, watch)? {
+    fn run(&mut self, start: Start<D>, cooling: Cooling) -> ControlFlow<()> {
+        if !self.place(start)? {
             return ControlFlow::Continue(());
         }
         let sigma = match start {
-            Start::Moved => warmth(ws),
+            Start::Moved => self.warmth(),
             _ => cooling.sigma,
         };
-        self.anneal(ws, Cooling { sigma, ..cooling }, watch)
+        self.anneal(Cooling { sigma, ..cooling })
     }
 
-    /// Sets `ws.state` to a start: base and warped positions. Returns `false` if the sets have no
-    /// such start.
-    fn place<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        start: Start<D>,
-        watch: Watch<'_>,
-    ) -> ControlFlow<(), bool> {
+    /// Sets the current run to a start: base and warped positions. Returns `false` if the sets have
+    /// no such start.
+    fn place(&mut self, start: Start<D>) -> ControlFlow<(), bool> {
         const NO_START: ControlFlow<(), bool> = ControlFlow::Continue(false);
-        let (model, target) = (&*ws.model, &*ws.target);
-        let state = &mut ws.state;
+        let problem = self.problem;
+        let (model, target, spacing) = (&*problem.model, &*problem.target, problem.spacing);
+        let Runner {
+            annealer,
+            run,
+            patterns,
+            consensus,
+            tuples,
+            correspondence,
+            levels,
+            ..
+        } = &mut *self.runner;
         match start {
             Start::Best => {
-                state.copy_from(&ws.best);
+                run.copy_from(self.best);
                 return ControlFlow::Continue(true);
             }
             Start::Patterns => {
-                state.copy_from(&ws.best);
-                let rows = 0..model.len();
-                if !ws
-                    .patterns
-                    .propose(rows, &state.warped, target, MAX_PATTERN_REACH, watch)?
-                {
+                run.copy_from(self.best);
+                let (rows, reach) = (0..model.len(), MAX_PATTERN_REACH);
+                let sets = (&*run.warped, target);
+                if !patterns.propose(rows, sets, spacing, reach, self.watch)? {
                     return NO_START;
                 }
-                let pairs = &ws.patterns.pairs;
-                ws.consensus
-                    .fit(&mut ws.annealer, SCALES, (model, target), pairs, state);
+                consensus.fit(annealer, problem, model, &patterns.pairs, run);
                 return ControlFlow::Continue(true);
             }
             Start::Moved => {
-                if model.len() >= MIN_DENSE_POINTS {
-                    ws.levels.model_order.build(model);
+                if problem.is_dense() {
+                    levels.model_order.build(model);
                 }
-                return self.place_by_motions(ws, watch);
+                return self.place_by_motions();
             }
-            Start::Centred => state.base.clone_from(&ws.model),
+            Start::Centred => run.base.clone_from(&problem.model),
             Start::Moments(rotation) => {
-                starts::moments(model, target, &rotation, &mut state.base);
+                starts::moments(model, target, &rotation, &mut run.base);
             }
             Start::Tuples => {
-                let limited = self.rotation == Rotation::Limited;
-                let base = &mut state.base;
-                let still = ws.frame.still();
-                if !ws
-                    .tuples
-                    .find((model, target), ws.spacing, limited, &still, base, watch)?
-                {
+                let limited = problem.options.rotation == Rotation::Limited;
+                let (base, still) = (&mut run.base, problem.frame.still());
+                if !tuples.find((model, target), spacing, limited, &still, base, self.watch)? {
                     return NO_START;
                 }
             }
             Start::Labelling => {
                 // If noise hides the correspondence, the surroundings of the points hold no
                 // information.
-                let hidden = ws.best.ambiguity >= 0.8 && ws.best.sigma >= 0.999 * REHEAT.sigma;
-                if hidden && !ws.annealer.rigid.is_active() {
+                let hidden = self.best.ambiguity >= 0.8 && self.best.sigma >= 0.999 * REHEAT.sigma;
+                if hidden && problem.bends() {
                     return NO_START;
                 }
-                state.base.clone_from(&ws.model);
-                ws.correspondence.find(&state.base, target, watch)?;
-                let pairs = &ws.correspondence.pairs;
-                ws.consensus
-                    .fit(&mut ws.annealer, SCALES, (model, target), pairs, state);
+                run.base.clone_from(&problem.model);
+                correspondence.find(&run.base, target, self.watch)?;
+                consensus.fit(annealer, problem, model, &correspondence.pairs, run);
                 return ControlFlow::Continue(true);
             }
         }
-        state.warped.clone_from(&state.base);
+        run.warped.clone_from(&run.base);
         ControlFlow::Continue(true)
     }
 
-    /// Moves `ws.state` by the motions of the blocks. Returns `false` if they do not agree on a
+    /// Moves the current run by the motions of the blocks. Returns `false` if they do not agree on a
     /// field.
-    pub(super) fn place_by_motions<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        watch: Watch<'_>,
-    ) -> ControlFlow<(), bool> {
-        let still = ws.frame.still();
-        let state = &mut ws.state;
+    pub(super) fn place_by_motions(&mut self) -> ControlFlow<(), bool> {
+        let problem = self.problem;
+        let Runner {
+            annealer,
+            run,
+            levels,
+            motions,
+            ..
+        } = &mut *self.runner;
+        let still = problem.frame.still();
         let as_it_lies = |p: &[f64; D]| std::array::from_fn(|k| p[k] + still[k]);
-        state.base.clear();
-        state.base.extend(ws.model.iter().map(as_it_lies));
-        let spacing = mean_spacing(ws.annealer.volume, &ws.target);
-        let sets = (&*state.base, &*ws.target);
-        let order = &ws.levels.model_order.order;
-        if !ws.motions.find(sets, order, spacing, ws.farthest, watch)? {
+        run.base.clear();
+        run.base.extend(problem.model.iter().map(as_it_lies));
+        let spacing = problem.mean_spacing;
+        let sets = (&*run.base, &*problem.target);
+        let order = &levels.model_order.order;
+        if !motions.find(sets, order, spacing, problem.farthest, self.watch)? {
             return ControlFlow::Continue(false);
         }
-        let seeds = &ws.motions.seeds;
-        let mean = SVector::from(ws.motions.mean());
-        for p in &mut state.base {
+        let mean = SVector::from(motions.mean());
+        for p in &mut run.base {
             *p = (SVector::from(*p) + mean).into();
         }
-        let annealer = &mut ws.annealer;
-        let stride = annealer.prior.stride;
-        annealer.weights.clear();
-        annealer.weights.resize(stride, 0.0);
-        let nothing = state.base.iter().map(|_| [0.0; D]);
-        annealer.residuals.fill(stride, nothing);
-        for (row, motion) in seeds
-            .iter()
-            .filter_map(|seed| Some((seed.row, seed.value()?)))
-        {
-            annealer.weights[row] = 1.0;
+        let Annealer {
+            weights,
+            residuals,
+            prior,
+            regression,
+            rigid,
+            ..
+        } = annealer;
+        weights.clear();
+        weights.resize(prior.stride, 0.0);
+        residuals.fill(prior.stride, run.base.iter().map(|_| [0.0; D]));
+        let seeds = motions.seeds.iter();
+        for (row, motion) in seeds.filter_map(|seed| Some((seed.row, seed.value()?))) {
+            weights[row] = 1.0;
             for k in 0..D {
-                annealer.residuals.0[k][row] = motion[k] - mean[k];
+                residuals.0[k][row] = motion[k] - mean[k];
             }
         }
-        let (weights, wanted) = (&annealer.weights, &annealer.residuals);
         let variance = (MOTION_ERROR * spacing).powi(2);
-        let (regression, prior) = (&mut annealer.regression, &annealer.prior);
-        if annealer.rigid.is_active() {
-            annealer
-                .rigid
-                .fit(weights, &state.base, wanted, variance, regression);
+        if problem.bends() {
+            regression.fit(prior, weights, residuals, variance);
         } else {
-            regression.fit(prior, weights, wanted, variance);
+            rigid.fit(weights, &run.base, residuals, variance, regression);
         }
         let field = &regression.displacement.0;
-        state.warped.clear();
-        let rows = state.base.iter().enumerate();
+        run.warped.clear();
+        let rows = run.base.iter().enumerate();
         let moved = rows.map(|(i, b)| std::array::from_fn(|k| b[k] + field[k][i]));
-        state.warped.extend(moved);
+        run.warped.extend(moved);
         ControlFlow::Continue(true)
     }
 
-    /// Anneals `ws.state` from its current positions, and keeps it if it is the best so far.
-    fn anneal<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        cooling: Cooling,
-        watch: Watch<'_>,
-    ) -> ControlFlow<()> {
-        ws.matched_before = ws.best.matched;
-        (ws.state.energy, ws.state.tail) = (f64::INFINITY, 0.0);
-        let flow = self.anneal_only(ws, cooling, watch);
-        ws.state.far = ws.is_far(&ws.state);
-        if ws.starts == 1 {
-            ws.best.copy_from(&ws.state);
-            if self.is_exact(ws) {
+    /// Temperature of a start from the motions of blocks: at most their error. At a higher
+    /// temperature, sets that already coincide would drift along a lattice.
+    pub(super) fn warmth(&mut self) -> f64 {
+        let spacing = self.problem.mean_spacing;
+        let Runner { motions, run, .. } = &mut *self.runner;
+        let miss = motions.miss(&run.warped, &self.problem.target, spacing);
+        (MISSES * miss).clamp(COLDEST * spacing, MOVED.sigma * spacing)
+    }
+
+    /// Anneals the current run, and keeps it if it is the best so far.
+    fn anneal(&mut self, cooling: Cooling) -> ControlFlow<()> {
+        self.matched_before = self.best.matched;
+        let run = &mut self.runner.run;
+        (run.energy, run.tail) = (f64::INFINITY, 0.0);
+        let flow = self.anneal_only(cooling);
+        let (problem, run) = (self.problem, &mut self.runner.run);
+        run.far = problem.is_far(&run.warped);
+        if self.starts == 1 {
+            self.best.copy_from(run);
+            if self.is_exact() {
                 return flow; // no other run follows to compare it with
             }
         }
-        ws.state.tail = ws.annealer.tail(0.1 * ws.spacing);
-        ws.annealer
-            .evaluate(&mut ws.state, self.share, ws.annealer.resolution);
-        if ws.state.far {
-            ws.state.energy = f64::INFINITY;
+        let Runner { run, annealer, .. } = &mut *self.runner;
+        run.tail = annealer.tail(0.1 * problem.spacing);
+        annealer.evaluate(run, problem.slack(), problem.limits.resolution);
+        if run.far {
+            run.energy = f64::INFINITY;
         }
-        if ws.state.energy < ws.best.energy || ws.starts == 1 {
-            ws.best.copy_from(&ws.state);
+        if run.energy < self.best.energy || self.starts == 1 {
+            self.best.copy_from(run);
         }
         flow
     }
 
-    /// Anneals `ws.state` from its current positions.
-    pub(super) fn anneal_only<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        cooling: Cooling,
-        watch: Watch<'_>,
-    ) -> ControlFlow<()> {
-        let smaller = ws.model.len().min(ws.target.len()) as f64;
+    /// Anneals the current run.
+    pub(super) fn anneal_only(&mut self, cooling: Cooling) -> ControlFlow<()> {
+        let smaller = self.problem.smaller() as f64;
         let schedule = Schedule {
             collapse: 0.5 * smaller,
             partners: smaller,
-            ..self.schedule(cooling)
+            ..self.problem.schedule(cooling)
         };
-        ws.starts += 1;
-        ws.state.trace.clear();
-        (ws.state.iterations, ws.state.noisy) = (0, false);
-        ws.annealer.run(&mut ws.state, &schedule, watch)
+        self.starts += 1;
+        let Runner { run, annealer, .. } = &mut *self.runner;
+        run.trace.clear();
+        (run.iterations, run.noisy) = (0, false);
+        annealer.run(run, &schedule, self.watch)
+    }
+
+    /// The schedule at the temperature of the best run.
+    fn schedule_at_end(&self) -> Schedule {
+        self.problem.schedule(Cooling {
+            sigma: self.best.sigma,
+            ..SLOW
+        })
     }
 
     /// Averages over the scales of the prior by their evidence, twice: the first average changes
     /// matches and noise level, from which the second starts.
-    fn average_scales<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        watch: Watch<'_>,
-    ) -> ControlFlow<()> {
-        let schedule = self.schedule(Cooling {
-            sigma: ws.best.sigma,
-            ..SLOW
-        });
-        let ambiguity = ws.annealer.restore(&ws.best, &mut ws.state, &schedule);
-        if ambiguity > MOST_SPREAD {
+    fn average_scales(&mut self) -> ControlFlow<()> {
+        let schedule = self.schedule_at_end();
+        let Runner {
+            annealer,
+            run,
+            scales,
+            ..
+        } = &mut *self.runner;
+        let (model, best) = (&self.problem.model, &mut *self.best);
+        if annealer.restore(best, run, &schedule) > MOST_SPREAD {
             return ControlFlow::Continue(());
         }
-        let mut average = |ws: &mut SoftassignWorkspace<D>, likely: bool| {
-            let variance = ws.best.sigma * ws.best.sigma;
-            let request = ws.annealer.request();
-            let (model, best) = (&ws.model, &mut ws.best);
-            ws.scales.average(
-                request,
-                model,
-                best,
-                (variance, SCALES.affine),
-                likely,
-                watch,
-            )
-        };
-        let likeliest = average(ws, false)?;
-        ws.annealer.prior.build(&ws.model, likeliest);
-        ws.state.copy_from(&ws.best);
+        let noise = |best: &Run<D>| (best.sigma * best.sigma, SCALES.affine);
+        let scale = noise(best);
+        let likeliest =
+            scales.average(annealer.request(), model, best, scale, false, self.watch)?;
+        annealer.prior.build(model, likeliest);
+        run.copy_from(best);
         // A third round moves the warp by only a hundredth of the noise.
-        ws.annealer.settle(&mut ws.state, &schedule, 2);
-        ws.best.sigma = ws.state.sigma;
-        average(ws, true)?;
+        annealer.settle(run, &schedule, 2);
+        best.sigma = run.sigma;
+        let scale = noise(best);
+        scales.average(annealer.request(), model, best, scale, true, self.watch)?;
         ControlFlow::Continue(())
     }
 
-    pub(super) fn schedule(&self, mut cooling: Cooling) -> Schedule {
-        if self.transformation != Transformation::Smooth {
-            // A motion without bending can stall while it rotates into place.
-            cooling.stuck = cooling.patience;
+    /// Whether no further start can do better. The best run is exact, or the residuals of a dense
+    /// set are so far below its spacing that no part can be displaced, or noise explains residuals
+    /// and soft partners.
+    fn is_done(&self) -> bool {
+        let (problem, best) = (self.problem, &*self.best);
+        if best.far || self.is_exact() {
+            return !best.far;
         }
-        Schedule {
-            cooling,
-            floor: 0.0,
-            limit: self.max_iterations,
-            collapse: 0.0,
-            partners: f64::INFINITY,
-            slack: self.slack(),
+        let matched = best.matched / problem.smaller() as f64;
+        if problem.is_dense() {
+            let complete = matched >= self.wanted_share();
+            return best.sigma <= 0.15 * problem.spacing && complete && best.tail <= 0.01;
         }
-    }
-
-    /// Whether no further start can do better. The result is exact, or the residuals of a dense set
-    /// are so far below its spacing that no part can be displaced, or noise explains residuals and
-    /// soft partners.
-    fn is_done<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
-        let points = ws.model.len().min(ws.target.len());
-        let (best, matched) = (&ws.best, ws.best.matched / points as f64);
-        if best.far {
-            return false;
-        }
-        if self.is_exact(ws) {
-            return true;
-        }
-        if points >= MIN_DENSE_POINTS {
-            let complete = matched >= wanted_share(ws);
-            return best.sigma <= 0.15 * ws.spacing && complete && best.tail <= 0.01;
-        }
-        let unequal = confidence::are_unequal(ws.model.len(), ws.target.len());
-        let gain = if unequal { 1.2 } else { MIN_TELLING_GAIN };
+        let unequal = confidence::are_unequal(problem.model.len(), problem.target.len());
+        let least = if unequal { 1.2 } else { MIN_TELLING_GAIN };
         // Soft partners that spread less than this, relative to the temperature, are decided. For
         // well separated points the spread is 0.05; if a part is displaced it is 0.12 to 0.6.
-        ws.gain().is_some_and(|found| found >= gain)
+        problem.gain(best).is_some_and(|gain| gain >= least)
             && matched >= 0.9
             && best.tail <= 0.03
             && best.ambiguity <= 0.1
     }
 
     /// Whether the best run so far fits nearly all points of the smaller set to rounding.
-    pub(super) fn is_exact<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
-        let points = ws.model.len().min(ws.target.len());
-        let dense = points >= MIN_DENSE_POINTS;
-        !ws.best.far
-            && ws.best.sigma <= ws.annealer.clean_sigma
-            && ws.best.matched >= wanted_share(ws) * points as f64
-            && (ws.best.tail <= 0.01 || !dense)
+    pub(super) fn is_exact(&self) -> bool {
+        let (problem, best) = (self.problem, &*self.best);
+        !best.far
+            && best.sigma <= problem.limits.clean
+            && best.matched >= self.wanted_share() * problem.smaller() as f64
+            && (best.tail <= 0.01 || !problem.is_dense())
     }
-}
 
-impl<const D: usize> SoftassignWorkspace<D> {
     /// Whether a run from the motions of blocks kept their matches. If so, nearly all points within
     /// the box of the targets have a partner, and the pairs make the targets likelier than chance.
     pub(super) fn is_likely(&self) -> bool {
-        let dense = self.model.len().min(self.target.len()) >= MIN_DENSE_POINTS;
+        let (problem, best) = (self.problem, &*self.best);
         let sides: [_; D] = std::array::from_fn(|k| {
-            let values = self.target.iter().map(|t| t[k]);
+            let values = problem.target.iter().map(|t| t[k]);
             values.fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)))
         });
         let inside = |w: &&[f64; D]| (0..D).all(|k| sides[k].0 <= w[k] && w[k] <= sides[k].1);
-        let inside = self.best.warped.iter().filter(inside).count() as f64;
-        let gain = self.gain().unwrap_or(f64::INFINITY);
+        let inside = best.warped.iter().filter(inside).count() as f64;
+        let gain = problem.gain(best).unwrap_or(f64::INFINITY);
         // A surface that slipped along itself leaves residuals of a fifth of a spacing, as noise
         // does.
-        let near = D == 2 || self.best.sigma <= SLIPPED * self.spacing;
-        dense
+        let near = D == 2 || best.sigma <= SLIPPED * problem.spacing;
+        problem.is_dense()
             && near
-            && !self.best.far
-            && self.best.matched >= FOLLOWED * inside
-            && 2.0 * inside > self.model.len().min(self.target.len()) as f64
+            && !best.far
+            && best.matched >= FOLLOWED * inside
+            && 2.0 * inside > problem.smaller() as f64
             && gain >= MIN_TELLING_GAIN
-            && self.best.tail <= LEAST_ASIDE
+            && best.tail <= LEAST_ASIDE
+    }
+
+    /// Whether the best run so far ended below the noise and so lost some of its pairs.
+    pub(super) fn is_cold(&self) -> bool {
+        let smaller = self.problem.smaller() as f64;
+        self.best.sigma < 0.1 * self.problem.spacing && self.best.matched < 0.95 * smaller
+    }
+
+    /// Fraction of the smaller set that a complete answer matches. Dense sets may hold points that
+    /// occur in one of them only. This is accepted once a further start from the patterns matches no
+    /// more points, because the first such start leaves the edges of a cropped set shifted by one
+    /// point.
+    fn wanted_share(&self) -> f64 {
+        // Smaller changes of the number come from the temperature.
+        let grows = self.best.matched > 1.005 * self.matched_before;
+        if self.problem.is_dense() && self.starts >= 3 && !grows {
+            0.8
+        } else {
+            0.98
+        }
     }
 }
 
-/// Temperature of a start from the motions of blocks: at most their error. At a higher temperature,
-/// sets that already coincide would drift along a lattice.
-pub(super) fn warmth<const D: usize>(ws: &mut SoftassignWorkspace<D>) -> f64 {
-    let spacing = mean_spacing(ws.annealer.volume, &ws.target);
-    let miss = ws.motions.miss(&ws.state.warped, &ws.target, spacing);
-    (MISSES * miss).clamp(COLDEST * spacing, MOVED.sigma * spacing)
-}
-
-/// Mean nearest-neighbour distance of points that fill a volume.
-fn mean_spacing<const D: usize>(volume: f64, points: &[[f64; D]]) -> f64 {
-    (volume / points.len() as f64).powf(1.0 / D as f64)
-}
-
-/// Whether the best run so far ended below the noise and so lost some of its pairs.
-pub(super) fn is_cold<const D: usize>(ws: &SoftassignWorkspace<D>) -> bool {
-    let smaller = ws.model.len().min(ws.target.len()) as f64;
-    ws.best.sigma < 0.1 * ws.spacing && ws.best.matched < 0.95 * smaller
-}
-
-/// Fraction of the smaller set that a complete answer matches. Dense sets may hold points that
-/// occur in one of them only. This is accepted once a further start from the patterns matches no
-/// more points, because the first such start leaves the edges of a cropped set shifted by one
-/// point.
-fn wanted_share<const D: usize>(ws: &SoftassignWorkspace<D>) -> f64 {
-    let dense = ws.model.len().min(ws.target.len()) >= MIN_DENSE_POINTS;
-    // Smaller changes of the number come from the temperature.
-    let grows = ws.best.matched > 1.005 * ws.matched_before;
-    if dense && ws.starts >= 3 && !grows {
-        0.8
-    } else {
-        0.98
-    }
-}
-
-/// Volume of the bounding box of the bulk of points of this radius. Thin sides count as a tenth of
-/// the radius of the model.
-pub(super) fn bounding_volume<const D: usize>(points: &[[f64; D]], radius: f64) -> f64 {
-    let limit = (BULK * radius).max(f64::MIN_POSITIVE);
-    let side = |k: usize| {
-        let bulk = points.iter().filter(|p| p.iter().all(|c| c.abs() <= limit));
-        let (low, high) = bulk.fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p[k]), h.max(p[k])));
-        (high - low).max(0.1)
+/// The starts after the first, with their schedules, from the cheapest to the most expensive.
+fn further_starts<const D: usize>(
+    problem: &Problem<D>,
+) -> impl Iterator<Item = (Start<D>, Cooling)> + use<D> {
+    let (options, dense) = (problem.options, problem.is_dense());
+    let limited = options.rotation == Rotation::Limited;
+    let seeded = seeded(problem.spacing);
+    let when = |wanted: bool, mechanism, start, cooling| {
+        (wanted && options.has(mechanism)).then_some((start, cooling))
     };
-    (0..D).map(side).product()
+    // Repeats from the improved field as long as more points are matched.
+    let patterns = when(dense, Mechanism::Patterns, Start::Patterns, seeded);
+    let first = [
+        when(!dense, Mechanism::Motions, Start::Moved, MOVED),
+        when(dense, Mechanism::Tuples, Start::Tuples, seeded),
+        when(true, Mechanism::Reheat, Start::Best, REHEAT),
+        when(true, Mechanism::Slow, Start::Centred, SLOW),
+        when(!dense, Mechanism::Tuples, Start::Tuples, seeded),
+        when(limited, Mechanism::Labelling, Start::Labelling, LABELLED),
+    ];
+    let rotations = starts::rotations::<D>(options.rotation)
+        .filter(move |_| options.has(Mechanism::Moments))
+        .map(|rotation| (Start::Moments(rotation), SLOW));
+    let last = when(true, Mechanism::LastReheat, Start::Best, REHEAT);
+    let first = [patterns; 6].into_iter().chain(first).flatten();
+    first.chain(rotations).chain(last)
 }
