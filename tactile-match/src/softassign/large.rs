@@ -1,9 +1,10 @@
 //! Matching of large sets, from coarse to fine.
 
-use super::assign::Blocks;
+use super::blocks::Blocks;
 use super::problem::{Problem, typical_spacing};
 use super::run::{Annealer, Cooling, Run, Schedule};
-use super::search::{FAST, MAX_PATTERN_REACH, Race, Runner, SCALES};
+use super::search::{MAX_PATTERN_REACH, Race, Runner, SCALES};
+use super::starts::FAST;
 use super::{Mechanism, Rotation, squared_distance, starts};
 use crate::Doubt;
 use crate::gaussian_process::{Axes, Prior};

@@ -16,7 +16,7 @@
 //! ```text
 //! problem ← both sets in one frame, and the options            problem
 //! for (start, schedule) in starts:                             search
-//!     place the model by the start                             starts, motion, patterns, correspond
+//!     place the model by the start                             starts, motion, patterns, tuples, correspond
 //!     while the temperature falls:                             run
 //!         M ← soft assignment of the predicted positions       assign
 //!         warp ← regression of the soft partners               gaussian_process, rigid
@@ -24,7 +24,7 @@
 //!     stop if best is exact, or noise explains its residuals   fine
 //! look for rivals: turned, mirrored, one lattice step off      rivals
 //! average the warp over the scales of the prior                scales
-//! answer ← pairs, confidences, covariances and doubts of best  confidence
+//! answer ← pairs, confidences, covariances and doubts of best  confidence, odds
 //! ```
 //!
 //! Most scenes are easy and end with the first run. Others get further starts: local patterns of
@@ -43,11 +43,15 @@
 //! in double precision, whatever the type of the points.
 
 mod assign;
+mod blocks;
+mod cells;
 mod confidence;
+mod consensus;
 mod correspond;
 mod fine;
 mod large;
 mod motion;
+mod odds;
 mod options;
 mod patterns;
 mod problem;
@@ -57,7 +61,10 @@ mod rivals;
 mod run;
 mod scales;
 mod search;
+mod series;
+mod spline;
 mod starts;
+mod tuples;
 
 #[cfg_attr(not(feature = "ablation"), allow(unreachable_pub))]
 pub use options::Mechanism;
@@ -68,9 +75,9 @@ use crate::{MatchError, MatchedPairs, Matching, StopReason, WarmStart, Watch};
 use confidence::Answer;
 use nalgebra::{Point, SVector, Vector3};
 use problem::Problem;
-use result::Series;
 use run::Run;
 use search::{Outcome, Race, Runner};
+use series::Series;
 use std::ops::ControlFlow;
 
 /// Reusable memory of matches.

@@ -1,7 +1,7 @@
 //! Motions of the parts of a set before any match: peaks of the differences between blocks and
 //! targets.
 
-use super::patterns::Cells;
+use super::cells::Cells;
 use super::{difference, squared_distance};
 use crate::Watch;
 use nalgebra::{SMatrix, SVector};

@@ -1,40 +1,33 @@
-//! Local patterns: the warped neighbours of a point identify its target. Also contains the robust
-//! fit of doubtful pairs.
+//! A start for dense sets: the warped neighbours of a point identify its target.
+//!
+//! Once the temperature is below the spacing of the points, a part of a dense set that is shifted by
+//! one point stays there: points are matched one by one, and each finds a neighbour's target nearby.
+//! The pattern of the neighbours, however, fits only at the correct target, and the more clearly the
+//! less regular the set is. For each model point i and each target j in reach, the neighbours are
+//! placed about `tⱼ` as the warp has them about `yᵢ`, and a small affine correction is fitted. The
+//! remaining distance to the targets there is the misfit of the candidate.
 
-use super::problem::Problem;
-use super::run::{Annealer, Run};
-use super::search::SCALES;
-use super::{difference, squared_distance};
+use super::cells::Cells;
+use super::difference;
 use crate::Watch;
-use crate::gaussian_process::{Axes, Prior, PriorScales};
 use nalgebra::{SMatrix, SVector};
-use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
 /// Working memory of the start.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LocalPatterns<const D: usize> {
     /// Cells for finding candidates and the targets of neighbours.
-    pub targets: Cells<D>,
-    pub gated: Cells<D>,
-    pub model: Cells<D>,
-    pub offsets: Vec<[f64; D]>,
-    pub distances: Vec<(f64, usize)>,
-    pub candidates: Vec<usize>,
-    pub best: Vec<Candidate>,
+    targets: Cells<D>,
+    gated: Cells<D>,
+    model: Cells<D>,
+    offsets: Vec<[f64; D]>,
+    distances: Vec<(f64, usize)>,
+    candidates: Vec<usize>,
+    best: Vec<Candidate>,
     /// The likeliest target of each model point, with the probability that it is correct.
     pub pairs: Vec<(usize, f64)>,
-    pub spacing: f64,
+    spacing: f64,
 }
-
-// A start for dense sets: the warped neighbours of a point identify its target.
-//
-// Once the temperature is below the spacing of the points, a part of a dense set that is shifted by
-// one point stays there: points are matched one by one, and each finds a neighbour's target nearby.
-// The pattern of the neighbours, however, fits only at the correct target, and the more clearly the
-// less regular the set is. For each model point i and each target j in reach, the neighbours are
-// placed about `tⱼ` as the warp has them about `yᵢ`, and a small affine correction is fitted. The
-// remaining distance to the targets there is the misfit of the candidate.
 
 /// Neighbours per point, for each dimension.
 const NEIGHBOURS: usize = 4;
@@ -43,7 +36,7 @@ const GATE: f64 = 0.45;
 
 /// The target that the pattern of a model point fits best.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Candidate {
+struct Candidate {
     target: usize,
     misfit: f64,
     /// Misfit at the second-best target.
@@ -216,215 +209,3 @@ impl<const D: usize> LocalPatterns<D> {
         self.pairs.extend(self.best.iter().map(pair));
     }
 }
-
-// Points in hashed square cells, so that a search by distance examines only nearby points.
-
-/// Beyond this number of cells from the origin all cells are one: such coordinates are as good as
-/// infinite.
-const MAX_CELLS: f64 = 1e9;
-/// Stands for "no point".
-const NONE: u32 = u32::MAX;
-
-/// Square cells that fill space.
-#[derive(Clone, Copy, Debug, Default)]
-struct Grid {
-    /// Reciprocal side of a cell.
-    per_side: f64,
-}
-
-impl Grid {
-    /// Cells of this side, which is positive and finite.
-    fn new(side: f64) -> Self {
-        Self {
-            per_side: side.recip(),
-        }
-    }
-
-    /// Index of a coordinate's cell along its axis.
-    #[inline]
-    fn cell(self, coordinate: f64) -> i64 {
-        let place = (coordinate * self.per_side).clamp(-MAX_CELLS, MAX_CELLS);
-        // Rounds down by hand: `floor` is a function call if the code is not compiled for newer
-        // instructions.
-        let towards_zero = place as i64;
-        towards_zero - i64::from(towards_zero as f64 > place)
-    }
-
-    /// Calls `visit` with each cell that intersects a box of half width `radius` about `place`.
-    #[inline]
-    fn for_each_cell<const D: usize>(
-        self,
-        place: &[f64; D],
-        radius: f64,
-        mut visit: impl FnMut(&[i64; D]),
-    ) {
-        let low = place.map(|c| self.cell(c - radius));
-        let high = place.map(|c| self.cell(c + radius));
-        let mut cell = low;
-        loop {
-            visit(&cell);
-            let Some(axis) = (0..D).find(|&k| cell[k] < high[k]) else {
-                return;
-            };
-            cell[axis] += 1;
-            cell[..axis].copy_from_slice(&low[..axis]);
-        }
-    }
-
-    /// Index of the chain of a cell. `chains` is a power of two.
-    #[inline]
-    fn chain<const D: usize>(cell: &[i64; D], chains: usize) -> usize {
-        let mixed = cell.iter().fold(0_u64, |hash, &c| {
-            (hash ^ c as u64)
-                .wrapping_mul(0x9e37_79b9_7f4a_7c15)
-                .rotate_left(29)
-        });
-        (mixed ^ (mixed >> 32)) as usize & (chains - 1)
-    }
-}
-
-/// Chains of points by the hash of their cell. Cells with the same hash share a chain, and
-/// distances separate their points.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Cells<const D: usize> {
-    points: Vec<[f64; D]>,
-    grid: Grid,
-    heads: Vec<u32>,
-    next: Vec<u32>,
-}
-
-impl<const D: usize> Cells<D> {
-    /// Stores points in cells of this side, which is positive and finite. `O(I)`.
-    pub(super) fn build(&mut self, points: &[[f64; D]], side: f64) {
-        self.points.clear();
-        self.points.extend_from_slice(points);
-        self.grid = Grid::new(side);
-        self.heads.clear();
-        self.heads
-            .resize((2 * points.len()).next_power_of_two(), NONE);
-        self.next.clear();
-        for (i, p) in points.iter().enumerate() {
-            let cell = p.map(|c| self.grid.cell(c));
-            let head = Grid::chain(&cell, self.heads.len());
-            self.next.push(self.heads[head]);
-            self.heads[head] = i as u32;
-        }
-    }
-
-    /// Calls `visit` with row and squared distance of each point within `radius` of `place`, in
-    /// unspecified order. A point is visited twice if two of the cells share a chain.
-    pub(super) fn within(&self, place: &[f64; D], radius: f64, mut visit: impl FnMut(usize, f64)) {
-        self.grid.for_each_cell(place, radius, |cell| {
-            let mut row = self.heads[Grid::chain(cell, self.heads.len())];
-            while row != NONE {
-                let square = squared_distance(&self.points[row as usize], place);
-                if square <= radius * radius {
-                    visit(row as usize, square);
-                }
-                row = self.next[row as usize];
-            }
-        });
-    }
-
-    /// The point nearest to `place`, if one is within `radius`.
-    pub(super) fn nearest(&self, place: &[f64; D], radius: f64) -> Option<usize> {
-        let mut best = (f64::INFINITY, None);
-        self.within(place, radius, |row, square| {
-            if square < best.0 {
-                best = (square, Some(row));
-            }
-        });
-        best.1
-    }
-}
-
-// A warp from doubtful pairs: a robust fit keeps the pairs that agree.
-
-/// Rounds of the fit. The first half uses a nearly affine warp.
-const FIT_ROUNDS: usize = 12;
-
-/// Working memory of the fit.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Consensus<const D: usize> {
-    prior: Prior,
-    weights: Vec<f64>,
-    trust: Vec<f64>,
-    wanted: Axes<D>,
-}
-
-impl<const D: usize> Consensus<D> {
-    /// Robust regression of the likeliest pairs, a target and probability for each model point. The
-    /// result is in `run.warped`. Pairs far from the common warp lose weight from round to round.
-    pub(super) fn fit(
-        &mut self,
-        annealer: &mut Annealer<D>,
-        problem: &Problem<D>,
-        model: &[[f64; D]],
-        pairs: &[(usize, f64)],
-        run: &mut Run<D>,
-    ) {
-        self.prior.build(
-            model,
-            PriorScales {
-                bending: 0.05,
-                ..SCALES
-            },
-        );
-        self.take(&problem.target, pairs, &run.base);
-        let mut variance = 1.0;
-        for round in 0..FIT_ROUNDS {
-            let prior = if round < FIT_ROUNDS / 2 {
-                &self.prior
-            } else {
-                &annealer.prior
-            };
-            annealer
-                .regression
-                .fit(prior, &self.weights, &self.wanted, f64::max(variance, 1e-4));
-            variance = self.reweigh(&annealer.regression.displacement, variance, problem.volume);
-        }
-        for (i, warped) in run.warped.iter_mut().enumerate() {
-            *warped =
-                std::array::from_fn(|k| run.base[i][k] + annealer.regression.displacement.0[k][i]);
-        }
-    }
-
-    /// Stores the displacements of the pairs and their weights.
-    fn take(&mut self, target: &[[f64; D]], pairs: &[(usize, f64)], base: &[[f64; D]]) {
-        let stride = self.prior.stride;
-        let rows = pairs.iter().zip(base);
-        self.wanted
-            .fill(stride, rows.map(|((j, _), b)| difference(&target[*j], b)));
-        self.trust.clear();
-        self.trust
-            .extend(pairs.iter().map(|(_, trust)| trust.clamp(0.05, 0.95)));
-        self.weights.clone_from(&self.trust);
-        self.weights.resize(stride, 0.0);
-    }
-
-    /// Computes new weights from the residuals. Returns the residual variance of the pairs that
-    /// agree, at least half of the last one.
-    fn reweigh(&mut self, displacement: &Axes<D>, last: f64, volume: f64) -> f64 {
-        let square = |i: usize| {
-            (0..D)
-                .map(|k| (displacement.0[k][i] - self.wanted.0[k][i]).powi(2))
-                .sum::<f64>()
-        };
-        let weight: f64 = self.weights.iter().sum();
-        let sum: f64 = (0..self.trust.len())
-            .map(|i| self.weights[i] * square(i))
-            .sum();
-        let variance = (sum / (D as f64 * weight.max(1e-9)))
-            .max(0.5 * last)
-            .clamp(1e-6, last);
-        let outlier = (TAU * variance).powf(0.5 * D as f64) / volume;
-        for (i, &trust) in self.trust.iter().enumerate() {
-            let agree = (-0.5 * square(i) / variance).exp() * trust;
-            self.weights[i] = agree / (agree + (1.0 - trust) * outlier).max(f64::MIN_POSITIVE);
-        }
-        variance
-    }
-}
-
-#[cfg(test)]
-mod tests;

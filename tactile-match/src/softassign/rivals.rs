@@ -1,7 +1,9 @@
 //! Rivals of an answer: the model rotated, mirrored or shifted by a step of its lattice.
 
+use super::cells::Cells;
 use super::run::Cooling;
-use super::search::{FAST, Race, Runner};
+use super::search::{Race, Runner};
+use super::starts::FAST;
 use super::{Mechanism, Rotation, difference, mean, squared, starts};
 use crate::Doubt;
 use nalgebra::{SMatrix, SVector};
@@ -62,6 +64,13 @@ const FOLLOW: Cooling = Cooling {
     stuck: 12,
     ..FAST
 };
+
+/// The points of both sets, to be found by their place.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LookUp<const D: usize> {
+    model: Cells<D>,
+    targets: Cells<D>,
+}
 
 /// The reflection at the first axis.
 fn mirror<const D: usize>() -> SMatrix<f64, D, D> {
@@ -283,12 +292,9 @@ impl<const D: usize> Race<'_, D> {
 
     /// Builds the look-up cells of model and targets.
     fn put_where_looked_up(&mut self, spacing: f64) {
+        self.runner.lookup.model.build(&self.problem.model, spacing);
         self.runner
-            .patterns
-            .model
-            .build(&self.problem.model, spacing);
-        self.runner
-            .patterns
+            .lookup
             .targets
             .build(&self.problem.target, spacing);
     }
@@ -311,7 +317,7 @@ impl<const D: usize> Race<'_, D> {
             let turned = moved.apply(p);
             let near = self
                 .runner
-                .patterns
+                .lookup
                 .model
                 .nearest(&turned.into(), reach * spacing);
             let Some(k) = near else {
@@ -320,7 +326,7 @@ impl<const D: usize> Race<'_, D> {
             };
             let place = SVector::from(self.best.warped[k])
                 + linear * (turned - SVector::from(self.problem.model[k]));
-            let found = self.runner.patterns.targets.nearest(&place.into(), spacing);
+            let found = self.runner.lookup.targets.nearest(&place.into(), spacing);
             distances.push(found.map_or(spacing, |j| {
                 (SVector::from(self.problem.target[j]) - place).norm()
             }));
@@ -404,7 +410,7 @@ impl<const D: usize> Race<'_, D> {
             let turned = moved.apply(p);
             let base = linear * turned + to;
             run.base.push(base.into());
-            let near = self.runner.patterns.model.nearest(&turned.into(), spacing);
+            let near = self.runner.lookup.model.nearest(&turned.into(), spacing);
             run.warped.push(near.map_or(base.into(), |k| {
                 let offset = linear * (turned - SVector::from(self.problem.model[k]));
                 (SVector::from(self.best.warped[k]) + offset).into()

@@ -7,19 +7,22 @@
 //! averaged.
 
 use super::confidence::{self, MIN_TELLING_GAIN};
+use super::consensus::Consensus;
 use super::correspond::Correspondence;
 use super::fine::FineFit;
 use super::large::Levels;
 use super::motion::Motions;
-use super::patterns::{Consensus, LocalPatterns};
+use super::patterns::LocalPatterns;
 use super::problem::Problem;
+use super::rivals::LookUp;
 use super::run::{Annealer, Cooling, Run, Schedule};
 use super::scales::ScaleAverage;
-use super::starts::Tuples;
+use super::starts::{FAST, MOVED, NEAR, OPEN, REHEAT, SLOW, Start, further_starts, seeded};
+use super::tuples::Tuples;
 use super::{Mechanism, Rotation, Search, starts};
 use crate::gaussian_process::PriorScales;
 use crate::{Doubt, Watch};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SVector;
 use std::ops::ControlFlow;
 
 /// Scales of the prior in the search.
@@ -32,50 +35,6 @@ pub(super) const SCALES: PriorScales = PriorScales {
 /// model.
 pub(super) const MAX_PATTERN_REACH: f64 = 0.25;
 
-/// Cooling of the first run. Its temperature falls independently of the residuals.
-pub(super) const FAST: Cooling = Cooling {
-    sigma: 0.3,
-    rate: 0.75,
-    least: 0.9,
-    patience: usize::MAX,
-    stuck: usize::MAX,
-    sweeps: 3,
-    still: 1e-4,
-    open: false,
-};
-/// Cooling of further runs, which follow the residuals. They end when the temperature has not
-/// fallen for `patience` iterations: matches that are still unsettled can drift for hundreds of
-/// iterations.
-const SLOW: Cooling = Cooling {
-    rate: 0.93,
-    least: 1.0,
-    patience: 20,
-    stuck: 8,
-    sweeps: 5,
-    // A tenth of this changes no mean of the ablation study and takes a fifth more time under
-    // noise.
-    still: 1e-3,
-    ..FAST
-};
-/// Cooling if a few points have lost their partners below the noise.
-const OPEN: Cooling = Cooling {
-    rate: FAST.rate,
-    open: true,
-    ..SLOW
-};
-/// Cooling from the best answer so far.
-const REHEAT: Cooling = Cooling {
-    sigma: 0.1,
-    rate: 0.9,
-    ..SLOW
-};
-/// Cooling from the motions of blocks. The temperature is their error, in mean spacings.
-const MOVED: Cooling = Cooling {
-    sigma: 0.4,
-    rate: FAST.rate,
-    sweeps: FAST.sweeps,
-    ..SLOW
-};
 /// First temperature of a start from the motions, relative to the distance that four in five points
 /// do not exceed: the remaining points are twice as far.
 const MISSES: f64 = 2.0;
@@ -95,49 +54,6 @@ const MOST_SPREAD: f64 = 0.3;
 const SLIPPED: f64 = 0.15;
 /// Error of a block's motion, in spacings.
 const MOTION_ERROR: f64 = 0.15;
-/// Cooling after relaxation labelling, whose pairs are more reliable than a first guess.
-const LABELLED: Cooling = Cooling {
-    sigma: 0.15,
-    ..SLOW
-};
-/// Cooling of the only run between sets that are near each other.
-const NEAR: Cooling = Cooling {
-    sigma: 0.2,
-    rate: 0.8,
-    least: 1.0,
-    patience: 12,
-    stuck: 12,
-    ..FAST
-};
-
-/// Cooling from the patterns or tuples of points. A higher temperature would contract a cropped set
-/// at its edges.
-fn seeded(spacing: f64) -> Cooling {
-    Cooling {
-        sigma: 0.3 * spacing,
-        ..REHEAT
-    }
-}
-
-/// Start of a run.
-#[derive(Clone, Copy, Debug)]
-enum Start<const D: usize> {
-    /// The centroids are aligned.
-    Centred,
-    /// The best answer so far.
-    Best,
-    /// The best answer so far, corrected by the local patterns of a dense set.
-    Patterns,
-    /// The pairs of relaxation labelling.
-    Labelling,
-    /// The unmoved sets, corrected by the motions of blocks.
-    Moved,
-    /// The second moments are aligned, after a rotation.
-    Moments(SMatrix<f64, D, D>),
-    /// The affine map on which local tuples of points agree.
-    Tuples,
-}
-
 /// Working memory of the runs. No run depends on what another has left here.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Runner<const D: usize> {
@@ -148,6 +64,7 @@ pub(super) struct Runner<const D: usize> {
     followed: Run<D>,
     correspondence: Correspondence,
     pub patterns: LocalPatterns<D>,
+    pub lookup: LookUp<D>,
     pub consensus: Consensus<D>,
     tuples: Tuples<D>,
     pub scales: ScaleAverage<D>,
@@ -643,32 +560,4 @@ impl<'a, const D: usize> Race<'a, D> {
             0.98
         }
     }
-}
-
-/// The starts after the first, with their schedules, from the cheapest to the most expensive.
-fn further_starts<const D: usize>(
-    problem: &Problem<D>,
-) -> impl Iterator<Item = (Start<D>, Cooling)> + use<D> {
-    let (options, dense) = (problem.options, problem.is_dense());
-    let limited = options.rotation == Rotation::Limited;
-    let seeded = seeded(problem.spacing);
-    let when = |wanted: bool, mechanism, start, cooling| {
-        (wanted && options.has(mechanism)).then_some((start, cooling))
-    };
-    // Repeats from the improved field as long as more points are matched.
-    let patterns = when(dense, Mechanism::Patterns, Start::Patterns, seeded);
-    let first = [
-        when(!dense, Mechanism::Motions, Start::Moved, MOVED),
-        when(dense, Mechanism::Tuples, Start::Tuples, seeded),
-        when(true, Mechanism::Reheat, Start::Best, REHEAT),
-        when(true, Mechanism::Slow, Start::Centred, SLOW),
-        when(!dense, Mechanism::Tuples, Start::Tuples, seeded),
-        when(limited, Mechanism::Labelling, Start::Labelling, LABELLED),
-    ];
-    let rotations = starts::rotations::<D>(options.rotation)
-        .filter(move |_| options.has(Mechanism::Moments))
-        .map(|rotation| (Start::Moments(rotation), SLOW));
-    let last = when(true, Mechanism::LastReheat, Start::Best, REHEAT);
-    let first = [patterns; 6].into_iter().chain(first).flatten();
-    first.chain(rotations).chain(last)
 }
