@@ -10,7 +10,7 @@
 use ndarray::{ArrayView2, Axis, Slice};
 use tactile_core::{BoundingBox, Estimate, Polarity, Requirement};
 
-use crate::drift::{self, DriftCorrection, FitWorkspace, IlluminationDrift};
+use crate::drift::{self, DriftCorrection, FitWorkspace, IlluminationDrift, RootOfPixels};
 use crate::error::ForceError;
 use crate::frame::{FrameStatistics, PassWorkspace, ReferenceFrame};
 use crate::noise::DifferenceNoise;
@@ -487,9 +487,10 @@ impl ContactDetector {
         // The sum of n pixels has √n times the noise of one.
         let z = quantile(0.5 * self.options.false_alarm_rate, tiles.sums.len()) * sd;
         let sign = self.options.polarity.sign();
-        let stands_out = |k: usize| {
+        let mut root = RootOfPixels::default();
+        let mut stands_out = |k: usize| {
             let tile = reference.tile_sum(tiles, k);
-            f64::from(sign) * drift.residual(&tile) > z * tile.pixels.sqrt()
+            f64::from(sign) * drift.residual(&tile) > z * root.of(&tile)
         };
         // The last tile of a band is the smallest. If all sums of a band are below the noise of
         // that tile, the band has no bright tile.
@@ -499,11 +500,11 @@ impl ContactDetector {
                 f64::from(tiles.greatest(band, sign)) <= z * last.pixels.sqrt()
             }
         };
+        let of_band = |band: usize| band * tiles.columns..(band + 1) * tiles.columns;
         (0..tiles.rows)
             .filter(|&band| !below_noise(band))
-            .flat_map(|band| {
-                (band * tiles.columns..(band + 1) * tiles.columns).filter(|&k| stands_out(k))
-            })
+            .flat_map(of_band)
+            .filter(|&k| stands_out(k))
             .map(|k| tiles.pixels(k, size))
             .reduce(BoundingBox::union)
     }

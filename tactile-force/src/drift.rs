@@ -210,6 +210,9 @@ impl IlluminationDrift {
     #[inline]
     fn at(&self, x: f64, y: f64) -> f64 {
         let [value, per_column, per_row] = self.coefficients;
+        if per_column == 0.0 && per_row == 0.0 {
+            return value;
+        }
         value + per_column * (x - self.middle[0]) + per_row * (y - self.middle[1])
     }
 
@@ -243,9 +246,10 @@ impl IlluminationDrift {
             tile.x < wide || tile.y < high || tile.x > right - wide || tile.y > bottom - high
         };
         let (mut agree, mut all) = ([0.0; 2], [0.0; 2]);
+        let mut root = RootOfPixels::default();
         for tile in tiles {
             // A tile agrees if its drift deviates by at most a hundredth of the background.
-            let limit = 3.0 * sd * tile.pixels.sqrt() + 0.01 * tile.reference;
+            let limit = 3.0 * sd * root.of(tile) + 0.01 * tile.reference;
             let agrees = f64::from(self.residual(tile).abs() <= limit);
             for k in 0..1 + usize::from(at_border(tile)) {
                 agree[k] += agrees;
@@ -322,18 +326,21 @@ impl IlluminationDrift {
         count
     }
 
-    /// Fits illumination and stray light to the tiles whose level per pixel is within a limit. A
-    /// line through their changes over the reference reveals which of them changed; otherwise the
+    /// Fits illumination and stray light to the tiles whose residual level per pixel is within a
+    /// limit. A line through their changes over the reference reveals which of them changed; otherwise the
     /// change is attributed to the illumination. `sd` is the noise of a pixel, and `scatter` the
     /// ratio of the tiles' scatter to the noise of a tile. Returns the number of tiles.
-    fn step_both(&mut self, tiles: &[TileSum], limit: f64, sd: f64, scatter: f64) -> usize {
-        let near = |tile: &&TileSum| (self.residual(tile) / tile.pixels).abs() <= limit;
+    fn step_both(&mut self, tiles: &Levels<'_>, limit: f64, sd: f64, scatter: f64) -> usize {
         let (mut count, mut pixels, mut sums) = (0, 0.0, [0.0; 8]);
         // The preceding tile stands for the structure of the reference: the change of a tile
         // contains the noise of its own reference level, which would cause a spurious slope.
         let mut before = None;
-        for tile in tiles.iter().filter(near) {
-            let (own, change) = (weight(tile) / tile.pixels, tile.difference / tile.pixels);
+        let levels = tiles.tiles.iter().zip(tiles.of_pixels).zip(tiles.residuals);
+        for ((tile, &[own, change]), residual) in levels {
+            let is_near = *residual <= limit;
+            if !is_near {
+                continue;
+            }
             let other = before.replace(own).unwrap_or(own);
             let products = [
                 own,
@@ -395,6 +402,32 @@ impl IlluminationDrift {
     }
 }
 
+/// Tiles with quantities per pixel.
+struct Levels<'a> {
+    tiles: &'a [TileSum],
+    /// Derivative by the illumination, and change.
+    of_pixels: &'a [[f64; 2]],
+    /// Absolute residuals.
+    residuals: &'a [f64],
+}
+
+/// Square root of the number of a tile's pixels, which nearly all tiles have in common.
+#[derive(Default)]
+pub(crate) struct RootOfPixels {
+    pixels: f64,
+    root: f64,
+}
+
+impl RootOfPixels {
+    #[inline(always)]
+    pub(crate) fn of(&mut self, tile: &TileSum) -> f64 {
+        if tile.pixels != self.pixels {
+            (self.pixels, self.root) = (tile.pixels, tile.pixels.sqrt());
+        }
+        self.root
+    }
+}
+
 /// Derivative of a tile's sum by the illumination.
 fn weight(tile: &TileSum) -> f64 {
     tile.reference.max(1.0)
@@ -404,6 +437,8 @@ fn weight(tile: &TileSum) -> f64 {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FitWorkspace {
     pub(crate) tiles: Vec<TileSum>,
+    /// Derivative by the illumination, and change, per pixel.
+    of_pixels: Vec<[f64; 2]>,
     pub(crate) values: Vec<f64>,
     pub(crate) scratch: Vec<f64>,
 }
@@ -421,6 +456,7 @@ pub(crate) fn fit(
 ) -> IlluminationDrift {
     let FitWorkspace {
         tiles,
+        of_pixels,
         values,
         scratch,
     } = workspace;
@@ -432,6 +468,11 @@ pub(crate) fn fit(
         ..IlluminationDrift::default()
     };
     let automatic = correction == DriftCorrection::Automatic;
+    of_pixels.clear();
+    if automatic {
+        let per_pixel = |tile: &TileSum| [weight(tile), tile.difference].map(|v| v / tile.pixels);
+        of_pixels.extend(tiles.iter().map(per_pixel));
+    }
     values.clear();
     values.extend(tiles.iter().map(|tile| drift.residual(tile) / weight(tile)));
     // A contact changes tiles to one side. The third on the other side is background even if a
@@ -448,7 +489,14 @@ pub(crate) fn fit(
         let limit = 3.0 * (quantile(values, 3, scratch) / THIRD).max(noise);
         let before = drift.tiles;
         drift.tiles = match automatic {
-            true => drift.step_both(tiles, limit, sd, limit / (3.0 * noise)),
+            true => {
+                let levels = Levels {
+                    tiles,
+                    of_pixels,
+                    residuals: values,
+                };
+                drift.step_both(&levels, limit, sd, limit / (3.0 * noise))
+            }
             false => drift.step(tiles, limit, sd),
         };
         // An equal number of tiles nearly always means the same tiles, so the fit has converged.
