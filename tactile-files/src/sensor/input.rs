@@ -1,6 +1,6 @@
 //! The input of a calibration: presses under known forces, a target, stated layers, and their file.
 use crate::io::{
-    FileError, beside, finite, length, modulus, not_negative, one_or_more, pixel_size,
+    FileError, FrameReader, beside, finite, length, modulus, not_negative, one_or_more, pixel_size,
     poisson_ratio, positive, positive_pair, read_frame, read_toml,
 };
 use crate::scene::{SceneLayer, refractive_index};
@@ -8,6 +8,7 @@ use ndarray::Array2;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use tactile_imaging::force::{Branch, ShearCalibration};
+use tactile_imaging::pipeline::FrameSource;
 
 /// An object that is pressed on the sensor for calibration.
 ///
@@ -152,12 +153,14 @@ impl SensorCalibration {
     /// gauge_error = 1e-3                  # relative, common to all forces
     /// gauge_noise_N = 2e-3
     /// coupling_error = 0.0                # under a fixed diffusing skin, 0.12 if absent
+    /// gravity_m_per_s2 = 9.81             # for masses, 9.80665 ± 0.15 % if absent
     /// covers_N = [0.1, 1.2]               # forces of later scenes, may be left out
     /// target = { image = "target.png", pitch_m = 1e-3, error = 5e-4 }
     ///
     /// [[presses]]
-    /// image = "press_01.png"
-    /// force_N = 0.1
+    /// image = "press_01.png"              # or a video, whose frames are averaged
+    /// frames = [20, 40]                   # first and last frame of a video, all if absent
+    /// force_N = 0.1                       # or mass_kg of a weight
     /// branch = "loading"                  # the default, or "unloading"
     /// # or indenter = { shape = "punch", radius_m = 2e-3 }, or none for any one body
     /// indenter = { shape = "ball", radius_m = 4e-3, radius_error_m = 5e-6 }
@@ -199,6 +202,8 @@ struct CalibrationFile {
     coupling_error: Option<f64>,
     #[serde(default, rename = "gauge_noise_N", deserialize_with = "positive")]
     gauge_noise_n: Option<f64>,
+    #[serde(default, deserialize_with = "positive")]
+    gravity_m_per_s2: Option<f64>,
     #[serde(default, rename = "covers_N", deserialize_with = "positive_pair")]
     covers_n: Option<[f64; 2]>,
     target: Option<TargetTable>,
@@ -207,6 +212,14 @@ struct CalibrationFile {
     #[serde(default)]
     layers: Vec<LayerTable>,
 }
+
+/// Standard gravity, and the relative standard error of the local one: 9.78 to 9.83, evenly
+/// distributed.
+const GRAVITY_M_PER_S2: f64 = 9.80665;
+const GRAVITY_ERROR: f64 = 1.5e-3;
+
+/// Largest number of frames of a video that are references.
+const MOST_REFERENCES: usize = 64;
 
 /// The relative error of a size or a gauge if none is stated.
 fn per_mille() -> f64 {
@@ -227,8 +240,12 @@ struct TargetTable {
 #[serde(deny_unknown_fields)]
 struct PressTable {
     image: PathBuf,
-    #[serde(rename = "force_N", deserialize_with = "not_negative")]
-    force_n: f64,
+    /// First and last frame of a video, from 1.
+    frames: Option<[usize; 2]>,
+    #[serde(default, rename = "force_N", deserialize_with = "not_negative")]
+    force_n: Option<f64>,
+    #[serde(default, deserialize_with = "not_negative")]
+    mass_kg: Option<f64>,
     #[serde(default = "loading", deserialize_with = "BranchName::deserialize")]
     branch: Branch,
     indenter: Option<IndenterTable>,
@@ -293,18 +310,53 @@ impl CalibrationFile {
         let image = |field: &str, name: &Path, size| {
             read_frame(file, field, &beside(file, name), None, size)
         };
-        let references = self.references.iter();
-        let references = references.map(|name| image("references", name, None));
-        let references = references.collect::<Result<Vec<_>, _>>()?;
+        let mut references = Vec::new();
+        for name in &self.references {
+            match image("references", name, None) {
+                Ok(frame) => references.push(frame),
+                Err(error) => {
+                    let range = [1, MOST_REFERENCES];
+                    let found = video(&beside(file, name), range, |frame| {
+                        references.push(frame.clone())
+                    });
+                    found.ok().filter(|frames| *frames > 0).ok_or(error)?;
+                }
+            }
+        }
         // All images come from one camera and have one size.
         let size = references.first().map(Array2::dim);
         let mut presses = Vec::with_capacity(self.presses.len());
         for (k, table) in self.presses.iter().enumerate() {
             let field = format!("presses[{}].image", k + 1);
-            let frame = image(&field, &table.image, size)?;
+            let frame = match (table.frames, image(&field, &table.image, size)) {
+                (None, Ok(frame)) => frame,
+                (range, still) => {
+                    let path = beside(file, &table.image);
+                    let mean = mean_of_video(&path, range.unwrap_or([1, usize::MAX]), size);
+                    match (still, mean) {
+                        (_, Ok(mean)) => mean,
+                        (Err(error), Err(_)) if range.is_none() => return Err(error),
+                        (_, Err(reason)) => {
+                            let field = format!("presses[{}].frames", k + 1);
+                            return Err(FileError::field(file, &field, reason));
+                        }
+                    }
+                }
+            };
+            let force_n = match (table.force_n, table.mass_kg) {
+                (Some(force_n), None) => force_n,
+                (None, Some(mass_kg)) => {
+                    mass_kg * self.gravity_m_per_s2.unwrap_or(GRAVITY_M_PER_S2)
+                }
+                _ => {
+                    let field = format!("presses[{}].force_N", k + 1);
+                    let reason = "expected either force_N in newtons or mass_kg of a weight";
+                    return Err(FileError::field(file, &field, reason));
+                }
+            };
             presses.push(SensorPress {
                 frame,
-                force_n: table.force_n,
+                force_n,
                 branch: table.branch,
                 indenter: (table.indenter.as_ref()).map_or(Indenter::Body, IndenterTable::indenter),
             });
@@ -326,6 +378,12 @@ impl CalibrationFile {
                 return Err(FileError::field(file, "pixel_size_m", reason));
             }
         };
+        // Gravity that is not stated is an error that all weights share.
+        let weights = self.presses.iter().any(|press| press.mass_kg.is_some());
+        let gravity_error = match self.gravity_m_per_s2 {
+            None if weights => GRAVITY_ERROR,
+            _ => 0.0,
+        };
         Ok(SensorCalibration {
             date: self.date,
             temperature_c: self.temperature_c,
@@ -337,11 +395,63 @@ impl CalibrationFile {
             shear: None,
             layers: self.layers.iter().map(LayerTable::layer).collect(),
             flat_field: self.flat_field.unwrap_or(true),
-            gauge_error: self.gauge_error,
+            gauge_error: self.gauge_error.hypot(gravity_error),
             coupling_error: self.coupling_error,
             gauge_noise_n: self.gauge_noise_n.unwrap_or(2e-3),
             covers_n: self.covers_n,
         })
+    }
+}
+
+/// Calls a function with the frames of a video from the first to the last, counted from 1, and
+/// returns their number.
+fn video(
+    path: &Path,
+    [first, last]: [usize; 2],
+    mut each: impl FnMut(&Array2<u8>),
+) -> Result<usize, String> {
+    let said = |error: &dyn std::fmt::Display| error.to_string();
+    // The times of the frames are not used.
+    let mut reader = FrameReader::open(path, 1.0).map_err(|error| said(&error))?;
+    let (mut frame, mut found) = (Array2::default((0, 0)), 0);
+    for number in 1..=last {
+        if reader
+            .next_frame(&mut frame)
+            .map_err(|error| said(&error))?
+            .is_none()
+        {
+            break;
+        }
+        if number >= first {
+            each(&frame);
+            found += 1;
+        }
+    }
+    Ok(found)
+}
+
+/// The rounded mean of frames of a video.
+fn mean_of_video(
+    path: &Path,
+    range: [usize; 2],
+    size: Option<(usize, usize)>,
+) -> Result<Array2<u8>, String> {
+    let mut sum = Array2::<u32>::zeros(size.unwrap_or_default());
+    let mut fits = true;
+    let count = video(path, range, |frame| {
+        fits &= frame.dim() == sum.dim();
+        if fits {
+            sum.zip_mut_with(frame, |sum, grey| *sum += u32::from(*grey));
+        }
+    })?;
+    let name = path.display();
+    match u32::try_from(count) {
+        Ok(0) => Err(format!("{name} has no frames {} to {}", range[0], range[1])),
+        _ if !fits => Err(format!(
+            "the frames of {name} have another size than the reference"
+        )),
+        Ok(count) => Ok(sum.mapv(|sum| ((2 * sum + count) / (2 * count)) as u8)),
+        Err(_) => Err(format!("{name} has too many frames")),
     }
 }
 
