@@ -111,6 +111,11 @@ pub trait ContactStage: Send + Sync {
         &[]
     }
 
+    /// See [`StressCalibration::unknown_hysteresis`](crate::force::StressCalibration::unknown_hysteresis).
+    fn unknown_hysteresis(&self) -> f64 {
+        0.0
+    }
+
     /// Whether a contact is brighter or darker than the reference.
     fn polarity(&self) -> Polarity {
         Polarity::Brighter
@@ -174,6 +179,10 @@ impl<P: Deref<Target: ContactStage> + Send + Sync> ContactStage for P {
         (**self).doubts()
     }
 
+    fn unknown_hysteresis(&self) -> f64 {
+        (**self).unknown_hysteresis()
+    }
+
     fn polarity(&self) -> Polarity {
         (**self).polarity()
     }
@@ -231,6 +240,9 @@ pub struct ContactReading {
     pub peak_grey: f64,
     /// Stress at the centre of the contact in pascals. `None` without a calibration.
     pub peak_stress_pa: Option<Uncertain>,
+    /// Whether an earlier frame of the press had a larger force, on a sensor that was calibrated
+    /// with rising forces alone. The error of the force then contains the hysteresis.
+    pub unknown_hysteresis: bool,
     /// Fraction of the contact's pixels that are saturated.
     pub saturated_share: f64,
     /// Whether the signal is outside the range of the calibration.
@@ -282,6 +294,7 @@ impl ContactReading {
             area_m2: PI * contact_radius_m.value.powi(2),
             peak_grey: 1.0,
             peak_stress_pa: None,
+            unknown_hysteresis: false,
             saturated_share: 0.0,
             out_of_calibration: false,
             touches_edge: false,
@@ -324,6 +337,41 @@ impl ContactReading {
         let force = self.force_n?.total();
         let below = force.value < force.standard_error;
         below.then_some(force.value + 2.0 * force.standard_error)
+    }
+
+    /// Relative changes of force and contact radius if the lens displaces the corners of a frame of
+    /// this size (rows, columns) by 1 % of their distance, outwards to the middle, and this is not
+    /// stated. A single frame does not show it. Sums that were calibrated under equal contacts have
+    /// no change of the force. `None` for a contact whose frame or pixels have no size.
+    ///
+    /// ```
+    /// use tactile_imaging::{force::Estimate, pipeline::ContactReading};
+    /// let mut contact = ContactReading::new(Some(Estimate::exact(0.5)), Estimate::exact(1e-3));
+    /// contact.centroid_px = [Estimate::exact(86.5), Estimate::exact(64.5)];
+    /// // A contact that reaches half way to the corners, 108 pixels of 18.5 µm.
+    /// let [force, radius] = contact.per_distortion((130, 174), [18.5e-6; 2]).expect("a frame");
+    /// // r + 0.01 r³/S² has this slope and area.
+    /// assert!((radius - 0.01 * 0.25).abs() < 1e-4);
+    /// assert!((force - 0.01 * 4.0 * 0.4 * 0.25).abs() < 1e-4);
+    /// ```
+    #[must_use]
+    pub fn per_distortion(
+        &self,
+        (rows, columns): (usize, usize),
+        pixel_size_m: [f64; 2],
+    ) -> Option<[f64; 2]> {
+        let middle = [columns, rows].map(|n| 0.5 * (n as f64 - 1.0));
+        let plain = LensGeometry::new(pixel_size_m).ok()?;
+        let corner_px = middle[0].hypot(middle[1]);
+        let lens = plain.with_distortion(middle, corner_px, [0.01, 0.0]).ok()?;
+        let centre = self.centroid_px.map(|c| c.value);
+        let [width, height] = pixel_size_m;
+        let radius_px = self.contact_radius_m.value / (width * height).sqrt();
+        let force = lens.mean_pixel_area_m2(centre, radius_px) / (width * height) - 1.0;
+        let rim = lens.to_metres([centre[0] + radius_px, centre[1]]);
+        let other = lens.to_metres([centre[0] - radius_px, centre[1]]);
+        let radius = (rim[0] - other[0]) / (2.0 * radius_px * width) - 1.0;
+        Some([force, radius])
     }
 
     /// The relative error of lengths that corresponds to a caution about the shape. An ellipse has

@@ -98,6 +98,12 @@ pub enum Flag {
         /// Largest difference of frame minus reference, in grey levels.
         grey: f64,
     },
+    /// The frame has lost its light: the camera dropped it, or the lamps were off. It is left out.
+    #[error("frame {frame}: black, left out: a dropped frame, or the lamps were off")]
+    BlackFrame {
+        /// The frame.
+        frame: usize,
+    },
     /// The frame shows more than one contact. The largest is measured, and the theory assumes a
     /// single contact.
     #[error("frame {frame}: {} besides the one measured", other_contacts(*others))]
@@ -202,6 +208,16 @@ pub enum Flag {
     GaugeNotZeroed {
         /// The force without light, in newtons.
         offset_n: f64,
+    },
+    /// The force has fallen, but the calibration has rising forces alone, so that its hysteresis is
+    /// unknown. The force has a standard error that covers a loop of ± 5 %.
+    #[error(
+        "frame {frame}: the force has fallen, but the calibration has rising forces alone: its \
+         hysteresis is unknown"
+    )]
+    UnknownHysteresis {
+        /// The frame.
+        frame: usize,
     },
     /// One pair of the calibration is far from the line through the others.
     #[error(
@@ -340,6 +356,8 @@ impl Flag {
             | Self::WiderThanFrame { frame, .. }
             | Self::CannotBeTold { frame, .. }
             | Self::OppositeSignal { frame, .. }
+            | Self::BlackFrame { frame }
+            | Self::UnknownHysteresis { frame }
             | Self::SeveralContacts { frame, .. }
             | Self::ProfileNotConverged { frame }
             | Self::NotABall { frame, .. }
@@ -444,6 +462,7 @@ impl ContactReading {
             with(share > 0.0, Flag::Saturated { frame, share }),
             with(self.out_of_calibration, Flag::OutOfCalibration { frame }),
             with(self.touches_edge, Flag::TouchesEdge { frame }),
+            with(self.unknown_hysteresis, Flag::UnknownHysteresis { frame }),
             with(others > 0, Flag::SeveralContacts { frame, others }),
             with(!self.converged, Flag::ProfileNotConverged { frame }),
             self.profile_misfit

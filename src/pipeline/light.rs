@@ -212,6 +212,13 @@ impl ContactStage for LightContact {
         Ok(())
     }
 
+    fn unknown_hysteresis(&self) -> f64 {
+        match self.force_from {
+            ForceFrom::Calibration => self.calibration.unknown_hysteresis(),
+            ForceFrom::Gauge => 0.0,
+        }
+    }
+
     fn doubts(&self) -> &[LineDoubt] {
         &self.doubts
     }

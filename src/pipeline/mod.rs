@@ -69,7 +69,7 @@ pub use error::{PipelineError, PipelineErrorKind};
 pub use flag::Flag;
 pub use known_presses::{CheckPress, CheckedObject, KnownBall};
 pub use light::LightContact;
-pub use press::Press;
+pub use press::{PerPercent, Press};
 pub use reference_light::ReferenceLight;
 pub use report::{Report, Skip, SkipReason, Stage, Work};
 pub use result::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult};

@@ -74,6 +74,22 @@ impl<'a> Loaded<'a> {
     }
 }
 
+/// Relative changes of the modulus for one per cent of what frames cannot show.
+///
+/// See [`Press::per_percent`] for an example.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct PerPercent {
+    /// For forces that are 1 % larger.
+    pub force: f64,
+    /// For pixels that are 1 % larger.
+    pub pixel_size: f64,
+    /// For a lens that displaces the corners by 1 % of their distance to the middle, in the middle
+    /// of the frame less. Zero if the lens is stated.
+    pub distortion: f64,
+}
+
 /// The contact of a frame.
 struct KnownContact {
     /// The contact. Frames read on demand have no mask here, so that nothing of the size of an
@@ -81,6 +97,8 @@ struct KnownContact {
     contact: FrameContact,
     /// Number of the contact's pixels.
     pixels: usize,
+    /// The largest force of the press up to this frame.
+    greatest_n: f64,
 }
 
 /// Frames at one or more loads. Each result is computed on first use, together with only the inputs
@@ -352,10 +370,22 @@ impl<'a> Press<'a> {
             let image = loaded.image.get(frame)?;
             let mut contact = self.measured(frame, image.view())?;
             let pixels = contact.pixels();
+            // Earlier frames are measured first, one after the other.
+            let greatest_n = match self.stages.unknown_hysteresis() > 0.0 {
+                true => (0..frame).fold(0.0, |before, k| {
+                    self.known(k).map_or(before, |k| k.greatest_n)
+                }),
+                false => 0.0,
+            };
+            let greatest_n = self.stages.with_hysteresis(greatest_n, &mut contact);
             if let FrameImage::Read(_) = loaded.image {
                 contact.mask = Array2::default((0, 0));
             }
-            Ok(Box::new(KnownContact { contact, pixels }))
+            Ok(Box::new(KnownContact {
+                contact,
+                pixels,
+                greatest_n,
+            }))
         });
         known.as_deref().map_err(Clone::clone)
     }
@@ -603,6 +633,62 @@ impl<'a> Press<'a> {
                 .ok()
         });
         Ok(estimates.collect())
+    }
+
+    /// By how much the modulus changes if forces, the pixel size or the distortion of the lens are
+    /// one per cent larger than stated.
+    ///
+    /// ```
+    /// use tactile_simulate::Trial;
+    /// let trial = Trial::coarser(8)?;
+    /// let pipeline = trial.pipeline()?;
+    /// let found = trial.press(&pipeline)?.per_percent()?;
+    /// // E is nearly proportional to F/a³, and more so because the guide yields, too.
+    /// assert!(found.force > 0.01 && found.pixel_size < -0.03 && found.distortion < 0.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`modulus`](Self::modulus).
+    pub fn per_percent(&self) -> Result<PerPercent, PipelineError> {
+        let pipeline = self.pipeline();
+        let estimator = pipeline.estimator()?;
+        let (size, bodies) = (pipeline.contact().pixel_size_m(), pipeline.bodies());
+        let mut loads = Vec::with_capacity(self.frames.len());
+        for frame in 0..self.frames.len() {
+            let load = Load::of(&self.reading(frame)?);
+            loads.push(load.ok_or(PipelineError::NoForce { frame })?);
+        }
+        self.leave_out(&mut loads);
+        let shape = self.stages.reference.image().dim();
+        // The local curve sums pressures over areas, which a larger pixel increases, too.
+        let of_area = f64::from(u8::from(pipeline.contact().pressure_curve().is_some()));
+        let lens = pipeline.contact().lens().is_none();
+        let with = |growth: &dyn Fn(&ContactReading) -> [f64; 2]| {
+            let changed = loads.iter().map(|load| {
+                let [force, radius] = growth(&load.contact).map(|growth| 1.0 + growth);
+                let mut load = *load;
+                load.force_n = load.force_n * force;
+                load.contact.contact_radius_m = load.contact.contact_radius_m * radius;
+                load
+            });
+            let series = loads::series(changed, Arc::clone(bodies), size);
+            let found = estimator
+                .estimate(&series)
+                .map_err(PipelineError::Modulus)?;
+            Ok::<_, PipelineError>(found.youngs_modulus_pa)
+        };
+        let plain = with(&|_| [0.0; 2])?;
+        let relative = |changed: f64| changed / plain - 1.0;
+        let distorted = |contact: &ContactReading| {
+            let growth = contact.per_distortion(shape, size).filter(|_| lens);
+            growth.unwrap_or_default()
+        };
+        Ok(PerPercent {
+            force: relative(with(&|_| [0.01, 0.0])?),
+            pixel_size: relative(with(&|_| [0.0201 * of_area, 0.01])?),
+            distortion: relative(with(&distorted)?),
+        })
     }
 
     /// The load of each frame, and the relative errors common to all.

@@ -1,10 +1,14 @@
 //! The light of the calibration's reference, and its change since then.
 use super::flag::Flag;
 use crate::force::{Estimate, ReferenceFrame};
-use ndarray::{ArrayView2, Axis, Slice};
+use ndarray::{ArrayView1, ArrayView2, Axis, Slice};
 
 /// Blocks along each side of a frame.
 const BLOCKS: usize = 8;
+
+/// Mean square of eight rows of blocks over their variance, which noise exceeds in one of a thousand
+/// references.
+const MOST_OF_ROWS: f64 = 3.5;
 
 /// Blocks darker than this have clipped pixels.
 const CLIPPED_GREY: f64 = 1.0;
@@ -96,11 +100,14 @@ impl ReferenceLight {
     /// well is its error. An even background leaves open which of the two changed: ln g is then
     /// half of the logarithm of the ratio, with as much as its error.
     pub(super) fn changed(&self, now: &ReferenceFrame) -> Option<LightChange> {
+        let rows = row_error_grey(now);
         let now = Self::of(now);
         if self.grey.len() != now.grey.len() {
             return None;
         }
         let noise = now.error_grey.hypot(self.error_grey);
+        // The rows of the calibration had the same noise, and the blocks of a row share it.
+        let of_rows = noise.hypot((2.0 * BLOCKS as f64).sqrt() * rows);
         // Clipped blocks have lost the light that they would be compared by.
         let mut now = now;
         without_bands(&self.grey, &mut now.grey);
@@ -113,8 +120,8 @@ impl ReferenceLight {
             blocks.iter().map(|&(then, now)| f(then, now)).sum()
         };
         let squares = sum(&|then, _| then * then);
-        let error = noise / squares.sqrt();
-        if blocks.len() < 3 || error > LARGEST_ERROR {
+        let error = of_rows / squares.sqrt();
+        if blocks.len() < 3 || noise / squares.sqrt() > LARGEST_ERROR {
             // Blocks that had light and have none now show another black level, or lamps that are
             // off.
             let lit = |then: &&f64| **then > 5.0 * noise + CLIPPED_GREY;
@@ -123,7 +130,8 @@ impl ReferenceLight {
         }
         let ratio = sum(&|then, now| then * now) / squares;
         let uneven = |squares_left: f64| {
-            let left = (squares_left / count - noise * noise).max(0.0);
+            let by_chance = noise * noise + MOST_OF_ROWS * rows * rows;
+            let left = (squares_left / count - by_chance).max(0.0);
             (left * count / squares).sqrt()
         };
         let alone = uneven(sum(&|then, now| (now - ratio * then).powi(2)));
@@ -135,7 +143,7 @@ impl ReferenceLight {
         let left = sum(&|then, now| (now - mean_now - gain * (then - mean)).powi(2));
         let is_structured = structure > LEAST_STRUCTURE * (spread - structure) && gain > 0.0;
         let by_structure = match is_structured {
-            true => (left / (count - 2.0)).max(noise * noise).sqrt() / structure.sqrt() / gain,
+            true => (left / (count - 2.0)).sqrt().max(of_rows) / structure.sqrt() / gain,
             false => f64::INFINITY,
         };
         let changed = (ratio - 1.0).abs() > 0.01 + 5.0 * error
@@ -167,6 +175,22 @@ impl ReferenceLight {
             seen,
         })
     }
+}
+
+/// Standard error of a block from the noise that the pixels of a row share, in grey levels: second
+/// differences of the means of the rows, without the noise of their pixels.
+fn row_error_grey(reference: &ReferenceFrame) -> f64 {
+    let image = reference.image();
+    let columns = image.ncols().max(1) as f64;
+    let mean = |row: ArrayView1<'_, u8>| row.iter().map(|v| f64::from(*v)).sum::<f64>() / columns;
+    let means: Vec<f64> = image.rows().into_iter().map(mean).collect();
+    let squares = means.windows(3).map(|m| (m[0] - 2.0 * m[1] + m[2]).powi(2));
+    // Second differences have six times the variance.
+    let variance = squares.sum::<f64>() / (6.0 * means.len().saturating_sub(2).max(1) as f64);
+    let level = means.iter().sum::<f64>() / means.len().max(1) as f64;
+    let of_pixels = reference.noise().variance(level) / columns;
+    let rows_of_block = (means.len() / BLOCKS).max(1) as f64;
+    ((variance - of_pixels).max(0.0) / rows_of_block).sqrt()
 }
 
 /// The factor between blocks then and now, by least squares.

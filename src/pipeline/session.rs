@@ -133,6 +133,8 @@ pub struct Session {
     /// The first contact, with which the loads of a flat face are compared.
     first_contact: Option<ContactReading>,
     drift: DriftWatch,
+    /// The largest force since the last frame without contact.
+    greatest_n: f64,
     /// The last requested surface.
     surface: ContactSurface,
 }
@@ -184,6 +186,7 @@ impl Session {
             strain: FollowedStrain::default(),
             first_contact: None,
             drift: DriftWatch::default(),
+            greatest_n: 0.0,
             surface: ContactSurface::default(),
         })
     }
@@ -252,6 +255,7 @@ impl Session {
         let (scratch, contact) = (&mut self.scratch, &mut self.contact);
         self.stages
             .contact(scratch, number as usize, frame, None, contact)?;
+        self.greatest_n = self.stages.with_hysteresis(self.greatest_n, contact);
         self.measured = true;
         self.measured_frame = number;
         // Noise changes the readings, so equal readings come from the same image. Counting them
@@ -270,6 +274,7 @@ impl Session {
         }
         if self.contact.reading.is_none()
             && let Some(grey) = self.contact.background_step_grey
+            && !self.stages.is_black(grey)
         {
             self.drift.watch(grey);
         }

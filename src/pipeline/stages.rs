@@ -25,6 +25,12 @@ use std::time::Instant;
 /// Number of consecutive control points that share the errors of a surface.
 const NEIGHBOURS: usize = 10;
 
+/// Smallest decrease of the force that is a way back.
+const LEAST_FALL: f64 = 0.02;
+
+/// Share of the reference's light that a black frame has lost. A camera's black level may remain.
+const LEAST_LOSS: f64 = 0.8;
+
 /// The stages and settings of a press or a session. They are constant.
 #[derive(Clone)]
 pub(super) struct Stages {
@@ -161,6 +167,32 @@ impl Stages {
         Ok(())
     }
 
+    /// Relative error of a force on the way back. See [`ContactStage::unknown_hysteresis`].
+    pub(super) fn unknown_hysteresis(&self) -> f64 {
+        self.contact.unknown_hysteresis()
+    }
+
+    /// Adds the unknown hysteresis to a force on the way back from the largest so far of its press,
+    /// and returns the largest including this one: zero without contact, which ends a press.
+    pub(super) fn with_hysteresis(&self, greatest_n: f64, contact: &mut FrameContact) -> f64 {
+        let error = self.unknown_hysteresis();
+        let reading = contact.reading.as_mut();
+        let Some((reading, force)) = reading.and_then(|r| r.force_n.map(|force| (r, force))) else {
+            let black = contact
+                .background_step_grey
+                .is_some_and(|step| self.is_black(step));
+            return if black { greatest_n } else { 0.0 };
+        };
+        let noise_n = force.part(Source::Noise).abs();
+        if error > 0.0 && force.value + 3.0 * noise_n < (1.0 - LEAST_FALL) * greatest_n {
+            reading.unknown_hysteresis = true;
+            reading.force_n = Some(force.by_relative(Source::Gain, error));
+            let stress = reading.peak_stress_pa;
+            reading.peak_stress_pa = stress.map(|s| s.by_relative(Source::Gain, error));
+        }
+        greatest_n.max(force.value)
+    }
+
     /// The factor for a force read from light: it corrects for light brighter than at the
     /// calibration and for the gain by presses of known force, without which it has this error.
     fn of_light(&self, coupling: f64) -> Uncertain {
@@ -221,6 +253,12 @@ impl Stages {
     ) -> Vec<Flag> {
         let reference = self.reference.image();
         let Some(reading) = &contact.reading else {
+            if contact
+                .background_step_grey
+                .is_some_and(|step| self.is_black(step))
+            {
+                return vec![Flag::BlackFrame { frame }];
+            }
             let sign = f64::from(self.contact.polarity().sign());
             let shift = self.reference.background_shift(image);
             let caution = shift.map(|grey| match grey * sign < 0.0 {
@@ -276,6 +314,15 @@ impl Stages {
         let step = contact.background_step_grey.filter(|&grey| grey != 0.0);
         flags.extend(step.map(|grey| Flag::LightDrifted { grey }));
         flags
+    }
+
+    /// Whether a frame without contact, darker than the reference by this on average, has lost its
+    /// light: the camera dropped it, or the lamps were off.
+    pub(super) fn is_black(&self, step_grey: f64) -> bool {
+        let image = self.reference.image();
+        let light = || image.iter().map(|v| f64::from(*v)).sum::<f64>() / image.len() as f64;
+        // Less than half a grey level is the smallest drift that is named.
+        step_grey < -0.5 && step_grey < -LEAST_LOSS * light()
     }
 
     /// The cautions about all frames: about the calibration, and the change of the light since.

@@ -5,7 +5,7 @@ use crate::console::Context;
 use crate::failure::{Exit, Failure};
 use crate::frames::{NamedFrame, SensorFrames};
 use crate::outputs::Csv;
-use crate::text::in_unit;
+use crate::text::{digits, in_unit};
 use clap::Args;
 use ndarray::Array2;
 use serde::Serialize;
@@ -108,7 +108,8 @@ pub(crate) fn run(arguments: &ForceArguments, context: &mut Context) -> Result<E
             context.line(format_args!("{name}:"));
             match found {
                 Ok(Update { contact, .. }) => {
-                    let answer = contact.map(|contact| Answer::new(&contact, frames.pixel_m()));
+                    let answer = contact
+                        .map(|contact| Answer::new(&contact, pixels.dim(), frames.pixel_m()));
                     print(answer.as_ref(), context);
                     context.warn_of_frame(&session.cautions());
                     csv.row(row(values.len(), answer.as_ref()));
@@ -142,10 +143,12 @@ struct Answer {
     centroid_m: [Estimate; 2],
     mean_stress_pa: Option<Estimate>,
     peak_stress_pa: Option<Estimate>,
+    /// Relative change of the force if the lens displaces the corners of the frame by 1 %.
+    force_per_percent_of_distortion: Option<f64>,
 }
 
 impl Answer {
-    fn new(contact: &ContactReading, pixel_m: [f64; 2]) -> Self {
+    fn new(contact: &ContactReading, shape: (usize, usize), pixel_m: [f64; 2]) -> Self {
         let [x, y] = contact.centroid_px;
         Self {
             force_n: contact.force_n.map(|force| force.total()),
@@ -154,6 +157,9 @@ impl Answer {
             centroid_m: [x * pixel_m[0], y * pixel_m[1]],
             mean_stress_pa: contact.mean_stress_pa().map(|stress| stress.total()),
             peak_stress_pa: contact.peak_stress_pa.map(|stress| stress.total()),
+            force_per_percent_of_distortion: contact
+                .per_distortion(shape, pixel_m)
+                .map(|[force, _]| force),
         }
     }
 }
@@ -176,6 +182,16 @@ fn print(answer: Option<&Answer>, context: &mut Context) {
     if let (Some(mean), Some(peak)) = (answer.mean_stress_pa, answer.peak_stress_pa) {
         let [mean, peak] = [mean, peak].map(|e| in_unit(e, 1e-3));
         context.row("stress", format_args!("{mean} kPa mean, {peak} kPa peak"));
+    }
+    // Named if it matters beside the error of the force.
+    let error = answer.force_n.map_or(0.0, |force| force.relative_error());
+    let lens = answer.force_per_percent_of_distortion;
+    if let Some(share) = lens.filter(|share| 3.0 * share.abs() > error) {
+        let share = digits(100.0 * share, 2);
+        context.row(
+            "lens",
+            format_args!("1 % of distortion at the corners is {share} % of the force"),
+        );
     }
 }
 

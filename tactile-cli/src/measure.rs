@@ -6,7 +6,7 @@ use crate::frames::{Colours, NamedFrame, Reading, frames_help};
 use crate::gel;
 use crate::plot::{PlotError, known_heights_mm, press_pages, summary_lines};
 use crate::simulation::{Physics, Simulation};
-use crate::text::in_unit;
+use crate::text::{digits, in_unit};
 use clap::Args;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -16,7 +16,9 @@ use tactile_files::io::{Grey, image_colour, image_size};
 use tactile_files::scene::{Scene, SceneData, SceneFrame};
 use tactile_files::sensor::GelPresses;
 use tactile_imaging::Pipeline;
-use tactile_imaging::pipeline::{ContactReading, Measurement, PipelineError, Press, Stage};
+use tactile_imaging::pipeline::{
+    ContactReading, Measurement, PerPercent, PipelineError, Press, Stage,
+};
 use tactile_simulate::{PressLoad, PressOptions, PressSimulation, PressTruth, Trial};
 
 /// Measure the Young's modulus of an object from frames at two or more loads
@@ -233,6 +235,9 @@ struct Answer<'a> {
     measurement: &'a Measurement,
     #[serde(skip_serializing_if = "Option::is_none")]
     truth: Option<Value>,
+    /// Relative change of the modulus for one per cent of what frames cannot show.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    modulus_per_percent: Option<PerPercent>,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     timing: &'a [Timing],
 }
@@ -289,6 +294,24 @@ pub(crate) fn run(arguments: &MeasureArguments, context: &mut Context) -> Result
     let timing = timing(&press, arguments.repetition.repeat, context);
     let truth = frames.truth();
     print(&measurement, truth, &timing, context);
+    let per_percent = press.per_percent().ok();
+    if let Some(PerPercent {
+        force,
+        pixel_size,
+        distortion,
+        ..
+    }) = per_percent
+    {
+        let [force, pixel_size, distortion] =
+            [force, pixel_size, distortion].map(|change| digits(100.0 * change, 2));
+        context.row(
+            "per cent",
+            format_args!(
+                "1 % of the forces is {force} % of the modulus, of the pixel size {pixel_size} %, \
+                 of distortion at the corners {distortion} %"
+            ),
+        );
+    }
     if let Some(error) = failure {
         context.note(frames.explain(error));
     }
@@ -298,6 +321,7 @@ pub(crate) fn run(arguments: &MeasureArguments, context: &mut Context) -> Result
     context.value(&Answer {
         measurement: &measurement,
         truth: truth.map(truth_value),
+        modulus_per_percent: per_percent,
         timing: &timing,
     });
     measurement.flags = flags;

@@ -15,8 +15,8 @@ use tactile_core::statistics::effective_degrees_of_freedom;
 use tactile_core::{Estimate, Requirement};
 
 use super::{
-    Branch, CalibrationPair, ForceReading, GreyHistogram, LinearCalibration, LocalCalibration,
-    StressCalibration,
+    Branch, CalibrationPair, ForceReading, GreyHistogram, HYSTERESIS, LinearCalibration,
+    LocalCalibration, StressCalibration,
 };
 use crate::error::ForceError;
 use crate::noise::DifferenceNoise;
@@ -317,6 +317,13 @@ impl LocalCalibration for PressureCurve {
 }
 
 impl StressCalibration for PressureCurve {
+    fn unknown_hysteresis(&self) -> f64 {
+        match self.report.hysteresis {
+            Some(_) => 0.0,
+            None => HYSTERESIS,
+        }
+    }
+
     fn force_n(&self, integrated_pixel_value: f64) -> f64 {
         self.sums.force_n(integrated_pixel_value)
     }

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 use tactile_core::Estimate;
 
-use super::{Branch, CalibrationPair, LineDoubt, StressCalibration};
+use super::{Branch, CalibrationPair, HYSTERESIS, LineDoubt, StressCalibration};
 use crate::error::{ForceError, check_observations};
 
 /// A straight line from integrated pixel value to force, F = b + s V, or F = s V through the
@@ -179,6 +179,14 @@ impl StressCalibration for LinearCalibration {
     fn range(&self) -> [f64; 2] {
         self.range
     }
+
+    fn unknown_hysteresis(&self) -> f64 {
+        if self.report.rising_only {
+            HYSTERESIS
+        } else {
+            0.0
+        }
+    }
 }
 
 /// The difference between loading and unloading.
@@ -269,6 +277,8 @@ pub struct LineReport {
     pub full_scale_n: f64,
     /// Whether the curve increases between the pixel values of the pairs.
     pub monotone: bool,
+    /// Whether the forces rise to the last pair, so that they do not show the hysteresis.
+    pub rising_only: bool,
     /// Reasons to doubt the pairs of a line with an offset.
     pub doubts: Vec<LineDoubt>,
 }
@@ -303,6 +313,7 @@ impl LineReport {
             smallest_force_n: 3.0 * residual_sd_n,
             full_scale_n,
             monotone: sensitivity_n > 0.0 && fitted.is_sorted(),
+            rising_only: rising_only(pairs),
             doubts: Vec::new(),
             residuals_n,
         }
@@ -310,6 +321,13 @@ impl LineReport {
 }
 
 /// 1 − Σr²/Σ(F − F̄)².
+/// Whether no pair was taken after the largest force: all loading, and the largest force last.
+fn rising_only(pairs: &[CalibrationPair]) -> bool {
+    let largest = pairs.iter().fold(0.0, |most: f64, p| most.max(p.force_n));
+    let last = pairs.last().is_some_and(|p| p.force_n == largest);
+    last && pairs.iter().all(|p| p.branch == Branch::Loading)
+}
+
 fn r_squared(forces: &[f64], residuals: &[f64]) -> f64 {
     let mean = forces.iter().sum::<f64>() / forces.len() as f64;
     let total: f64 = forces.iter().map(|f| (f - mean).powi(2)).sum();

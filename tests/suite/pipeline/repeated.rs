@@ -3,7 +3,8 @@ use super::trial;
 use crate::common::press_of;
 use ndarray::{Array2, Axis, s};
 use tactile_imaging::elasticity::modulus::{ModulusEstimator, PaperRatio};
-use tactile_imaging::pipeline::{Flag, Object, PipelineError, Session};
+use tactile_imaging::force::CalibrationPair;
+use tactile_imaging::pipeline::{Flag, Object, Pipeline, PipelineError, Session};
 
 #[test]
 fn a_frame_that_is_given_twice_counts_once() {
@@ -147,4 +148,77 @@ fn a_contact_that_is_not_the_punchs_has_no_sure_stress() {
     assert!(said && relative > 1.0, "{relative}");
     let (said, relative, _) = punch(radius_m);
     assert!(!said && relative < 0.05, "{relative}");
+}
+
+#[test]
+fn a_black_frame_is_left_out_and_named() {
+    let trial = trial(&[0.7, 1.2], 6);
+    let pipeline = trial.pipeline().unwrap();
+    let (reference, frames) = (&trial.simulation.reference, &trial.simulation.frames);
+    let run = |with_black: bool| {
+        let mut session = Session::new(&pipeline, &[reference.view()]).unwrap();
+        session.push(frames[0].view()).unwrap();
+        if with_black {
+            let black = Array2::zeros(reference.dim());
+            assert!(session.push(black.view()).unwrap().contact.is_none());
+            assert_eq!(session.cautions(), [Flag::BlackFrame { frame: 1 }]);
+            assert_eq!(session.drift().caution, None, "dropped, not drifted");
+        }
+        session.push(frames[1].view()).unwrap();
+        session.modulus().unwrap()
+    };
+    assert_eq!(run(true), run(false));
+    // Lamps that lose a third are a drift.
+    let mut session = Session::new(&pipeline, &[reference.view()]).unwrap();
+    session
+        .push(reference.mapv(|grey| grey - grey / 3).view())
+        .unwrap();
+    assert!(matches!(
+        session.drift().caution,
+        Some(Flag::LightDrifted { .. })
+    ));
+}
+
+/// Rising forces alone do not calibrate the way back: its force has an error that says so.
+#[test]
+fn the_way_back_has_the_hysteresis_that_the_calibration_does_not_show() {
+    let trial = trial(&[0.7, 1.2], 6);
+    let (reference, frames) = (&trial.simulation.reference, &trial.simulation.frames);
+    let largest = (trial.pairs.iter())
+        .max_by(|a, b| a.force_n.total_cmp(&b.force_n))
+        .unwrap();
+    let at = trial.pairs.iter().position(|pair| pair == largest).unwrap();
+    let size = trial.simulation.pixel_size_m;
+    let cautions = |pairs: &[CalibrationPair], order: [usize; 2], count: usize| {
+        let pipeline = Pipeline::from_pairs(pairs, size, Object::sphere(3e-3)).unwrap();
+        let mut session = Session::new(&pipeline, &[reference.view()]).unwrap();
+        let mut errors = Vec::new();
+        for k in order {
+            let contact = session.push(frames[k].view()).unwrap().contact.unwrap();
+            errors.push(contact.force_n.unwrap().relative_error());
+        }
+        let press = press_of(
+            &pipeline,
+            reference.view(),
+            order.map(|k| frames[k].clone()),
+        );
+        for (k, error) in errors.iter().enumerate() {
+            let reading = press.contact(k).unwrap().unwrap();
+            assert_eq!(reading.force_n.unwrap().relative_error(), *error);
+        }
+        let flag = Flag::UnknownHysteresis { frame: 1 };
+        assert_eq!(session.cautions().contains(&flag), count == 1);
+        assert_eq!(press.cautions(1).unwrap().contains(&flag), count == 1);
+        errors
+    };
+    let (rising, both) = (&trial.pairs[..=at], &trial.pairs[..]);
+    let there = cautions(rising, [0, 1], 0);
+    let back = cautions(rising, [1, 0], 1);
+    cautions(both, [1, 0], 0);
+    assert_eq!(
+        back[0], there[1],
+        "the largest force is where the branches meet"
+    );
+    // Five per cent to either side, evenly distributed.
+    assert!((back[1].powi(2) - there[0].powi(2)).sqrt() > 0.05 / 3_f64.sqrt() - 1e-3);
 }
