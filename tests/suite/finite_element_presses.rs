@@ -7,7 +7,7 @@
 //! `examples/contact_states.rs`. `tests/data/calculix_presses.csv` contains contacts of another
 //! program and is written by `evidence/ball_presses.py`.
 mod calculix;
-mod solved;
+pub(crate) mod solved;
 
 use crate::common::{Study, press_of};
 use nalgebra::{DMatrix, DVector};

@@ -80,7 +80,7 @@ pub(super) fn ball(seed: u64) -> Ball {
 
 /// A press of a ball on layers (thickness, modulus). The rim of the guide differs from that of the
 /// tables.
-pub(super) fn press(
+pub(crate) fn press(
     radius_m: f64,
     layers: &[(f64, f64)],
     modulus: f64,

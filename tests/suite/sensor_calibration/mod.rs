@@ -1,5 +1,6 @@
 //! A sensor calibrated from frames, and moduli measured with it.
 #![allow(clippy::print_stdout)]
+mod layers;
 mod sensors;
 mod uncalibrated;
 
