@@ -18,6 +18,9 @@ const SURE: f64 = 0.9;
 /// The light counts as unchanged within this number of standard errors of the level.
 const CHANGED: f64 = 2.0;
 
+/// Largest number of steps of a fit. Most take three.
+const MOST_STEPS: usize = 20;
+
 /// If changes of stray light alone and of illumination alone both deviate from the background's
 /// structure by more than these squared standard errors, both have changed.
 const BOTH: f64 = 16.0;
@@ -480,7 +483,9 @@ pub(crate) fn fit(
     values.iter_mut().for_each(|value| *value *= sign);
     drift.coefficients[0] += sign * quantile(values, 3, scratch);
     let noise = sd / ((TILE_ROWS * TILE_COLUMNS) as f64).sqrt();
-    for _ in 0..20 {
+    let mut seen = [[f64::NAN; 4]; MOST_STEPS];
+    let (mut steps, mut end) = (0, MOST_STEPS);
+    while steps < end {
         values.clear();
         let level = |tile: &TileSum| (drift.residual(tile) / tile.pixels).abs();
         values.extend(tiles.iter().map(level));
@@ -503,6 +508,17 @@ pub(crate) fn fit(
         if drift.tiles == before {
             break;
         }
+        // Tiles at the limit may come and go for ever. A step depends on the last state alone, so the
+        // state after the last step is known as soon as one repeats.
+        let [value, per_column, per_row] = drift.coefficients;
+        let state = [value, per_column, per_row, drift.stray_grey];
+        if end == MOST_STEPS
+            && let Some(earlier) = seen[..steps].iter().rposition(|other| *other == state)
+        {
+            end = steps + 1 + (MOST_STEPS - steps - 1) % (steps - earlier);
+        }
+        seen[steps] = state;
+        steps += 1;
     }
     if automatic {
         return drift.accepted(tiles, sd);
