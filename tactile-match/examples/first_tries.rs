@@ -4,8 +4,10 @@
 //! without a doubt.
 //!
 //! ```text
-//! cargo run --release -p tactile-match --example first_tries -- [FAMILY ...]
+//! cargo run --release -p tactile-match --example first_tries -- [ROUNDS] [FAMILY ...]
 //! ```
+//!
+//! Every round has seeds, turns and shifts of its own.
 //!
 //! A result is correct if at least 99 of 100 true pairs are found (97 with noise, because random
 //! points closer than the noise are exchanged). It is wrong if fewer than nine of ten found pairs,
@@ -29,6 +31,8 @@ struct Tally {
     refused: usize,
     silent: usize,
     seconds: f64,
+    /// Number of the round, from which seeds, turns and shifts follow.
+    round: u32,
     doubts: BTreeMap<String, usize>,
 }
 
@@ -152,13 +156,15 @@ fn lattice(
 }
 
 fn lattices(tally: &mut Tally) -> Result<(), MatchError> {
+    // In every round other angles and steps, and other seeds.
+    let (more, seeds) = (f64::from(tally.round), 100 * u64::from(tally.round));
     for hex in [false, true] {
         for noise in [0.0, 0.02, 0.1, 0.5] {
             for turn in [3.0, 5.0, 9.0, 14.0, 21.0, 26.0] {
-                lattice(tally, hex, noise, turn, 0.0, 7)?;
+                lattice(tally, hex, noise, turn + 0.37 * more, 0.0, 7 + seeds)?;
             }
             for shift in [0.1, 0.3, 0.6, 0.8, 1.4] {
-                lattice(tally, hex, noise, 0.0, shift, 8)?;
+                lattice(tally, hex, noise, 0.0, shift + 0.05 * more, 8 + seeds)?;
             }
         }
     }
@@ -215,8 +221,9 @@ fn plane(
 }
 
 fn still(tally: &mut Tally) -> Result<(), MatchError> {
+    let seeds = 100 * u64::from(tally.round);
     for n in [10, 30, 100, 1000, 5000, 20_000] {
-        plane(tally, "same", n, &|p| *p, 0.0, 0.0, false, 1)?;
+        plane(tally, "same", n, &|p| *p, 0.0, 0.0, false, 1 + seeds)?;
     }
     for (n, drift) in [
         (16_000, 0.05),
@@ -233,7 +240,7 @@ fn still(tally: &mut Tally) -> Result<(), MatchError> {
             0.0,
             0.0,
             true,
-            2,
+            2 + seeds,
         )?;
     }
     Ok(())
@@ -254,7 +261,8 @@ fn bent(tally: &mut Tally, sizes: &[usize]) -> Result<(), MatchError> {
             };
             let before = tally.seconds;
             let name = format!("stretch {stretch} bend {bend} noise {noise}");
-            plane(tally, &name, n, &image, noise, missing, false, 3)?;
+            let seed = 3 + 100 * u64::from(tally.round);
+            plane(tally, &name, n, &image, noise, missing, false, seed)?;
             println!("  {n} {name}: {:.2} s", tally.seconds - before);
         }
     }
@@ -264,7 +272,7 @@ fn bent(tally: &mut Tally, sizes: &[usize]) -> Result<(), MatchError> {
 /// Noisy grids of 9 by 7 markers, slightly shifted.
 fn grids(tally: &mut Tally) -> Result<(), MatchError> {
     for seed in 0..40 {
-        let mut stream = Stream(seed);
+        let mut stream = Stream(seed + 1000 * u64::from(tally.round));
         let (mut model, mut target) = (Vec::new(), Vec::new());
         for k in 0..63_u32 {
             let p = Point2::new(10.0 * f64::from(k % 9), 10.0 * f64::from(k / 9));
@@ -289,7 +297,7 @@ fn grids(tally: &mut Tally) -> Result<(), MatchError> {
 /// Points in space, 70 % of which are in both sets.
 fn overlaps(tally: &mut Tally) -> Result<(), MatchError> {
     for seed in 0..48 {
-        let mut stream = Stream(seed + 100);
+        let mut stream = Stream(seed + 100 + 1000 * u64::from(tally.round));
         let n = 60 + 20 * (seed as usize % 3);
         let world = random::<3>(n, &mut stream);
         let noise = if seed % 2 == 0 { 0.003 } else { 0.0 };
@@ -318,7 +326,12 @@ fn overlaps(tally: &mut Tally) -> Result<(), MatchError> {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let chosen: Vec<String> = std::env::args().skip(1).collect();
+    let mut chosen: Vec<String> = std::env::args().skip(1).collect();
+    let rounds: u32 = chosen
+        .first()
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(1);
+    chosen.retain(|word| word.parse::<u32>().is_err());
     for family in [
         "lattices", "grids", "overlaps", "still", "medium", "large", "huge",
     ] {
@@ -326,14 +339,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             continue;
         }
         let mut tally = Tally::default();
-        match family {
-            "lattices" => lattices(&mut tally)?,
-            "grids" => grids(&mut tally)?,
-            "overlaps" => overlaps(&mut tally)?,
-            "still" => still(&mut tally)?,
-            "medium" => bent(&mut tally, &[300, 1000, 3300, 3900, 7600])?,
-            "large" => bent(&mut tally, &[20_000])?,
-            _ => bent(&mut tally, &[100_000])?,
+        for round in 0..rounds {
+            tally.round = round;
+            match family {
+                "lattices" => lattices(&mut tally)?,
+                "grids" => grids(&mut tally)?,
+                "overlaps" => overlaps(&mut tally)?,
+                "still" => still(&mut tally)?,
+                "medium" => bent(&mut tally, &[300, 1000, 3300, 3900, 7600])?,
+                "large" => bent(&mut tally, &[20_000])?,
+                _ => bent(&mut tally, &[100_000])?,
+            }
         }
         println!(
             "{family}: {} scenes, {} right, {} refused, {} silent, {:.2} s, {:?}",

@@ -17,7 +17,7 @@ use super::problem::Problem;
 use super::rivals::LookUp;
 use super::run::{Annealer, Cooling, Run, Schedule};
 use super::scales::ScaleAverage;
-use super::starts::{FAST, MOVED, NEAR, OPEN, REHEAT, SLOW, Start, further_starts, seeded};
+use super::starts::{FAST, MOVED, NEAR, OPEN, REHEAT, SLOW, Start, further_starts};
 use super::tuples::Tuples;
 use super::{Mechanism, Rotation, Search, starts};
 use crate::gaussian_process::PriorScales;
@@ -206,7 +206,7 @@ impl<'a, const D: usize> Race<'a, D> {
         if follows {
             self.run(Start::Moved, MOVED)?;
         }
-        if self.starts == 0 || !self.is_followed()? {
+        if self.starts == 0 || !(self.is_exact() || self.is_likely()) {
             // Further starts would continue from this run even if it is wrong.
             std::mem::swap(&mut self.runner.followed, self.best);
             (self.best.energy, self.best.matched) = (f64::INFINITY, 0.0);
@@ -227,20 +227,6 @@ impl<'a, const D: usize> Race<'a, D> {
 
     pub(super) fn has(&self, mechanism: Mechanism) -> bool {
         self.problem.options.has(mechanism)
-    }
-
-    /// Whether a run from the motions of blocks is the answer. It is if it is exact, or if the set
-    /// is dense, the run is likely, and the local patterns of the points do not lead to a better
-    /// one.
-    fn is_followed(&mut self) -> ControlFlow<(), bool> {
-        if self.is_exact() || !self.is_likely() {
-            return ControlFlow::Continue(self.is_exact());
-        }
-        let energy = self.best.energy;
-        self.run(Start::Patterns, seeded(self.problem.spacing))?;
-        // Swaps of a few close points change the energy by less than this per point.
-        let least = energy - 0.01 * self.problem.model.len() as f64;
-        ControlFlow::Continue(self.best.energy >= least && self.is_likely())
     }
 
     /// Tries the starts that do not use the unmoved sets, until the best run leaves no doubt.

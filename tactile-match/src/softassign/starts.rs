@@ -67,7 +67,7 @@ pub(super) const NEAR: Cooling = Cooling {
 
 /// Cooling from the patterns or tuples of points. A higher temperature would contract a cropped set
 /// at its edges.
-pub(super) fn seeded(spacing: f64) -> Cooling {
+fn seeded(spacing: f64) -> Cooling {
     Cooling {
         sigma: 0.3 * spacing,
         ..REHEAT
