@@ -21,6 +21,7 @@ use crate::estimate::{
 use crate::fit::{Fit, Normal, Problem};
 use crate::parameters::Coordinate;
 use crate::ridge::Marginal;
+use crate::search::CLEAR_EVIDENCE;
 use crate::starts::GridStart;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
 use tactile_fem::Interface;
@@ -152,10 +153,16 @@ impl Hypothesis {
         better(&self.homogeneous, self.lump.as_ref())
     }
 
-    /// χ² over its degrees of freedom, but at least one: the factor by which differences of
-    /// log-evidence are too large.
-    pub(crate) fn inflation(&self, observed: &Observed) -> f64 {
-        (self.better().normal.misfit / observed.values.len() as f64).max(1.0)
+    /// Difference of log-evidence above which this assumption is clearly better than another. It
+    /// grows with χ² over its degrees of freedom, if these exceed one.
+    pub(crate) fn clear_evidence(&self, observed: &Observed) -> f64 {
+        let excess = self.better().normal.misfit / observed.values.len() as f64;
+        CLEAR_EVIDENCE * excess.max(1.0)
+    }
+
+    /// Log-evidence above which another assumption is a rival of this one.
+    pub(crate) fn rival_evidence(&self, observed: &Observed) -> f64 {
+        self.evidence() - self.clear_evidence(observed)
     }
 
     /// Log-evidence with an inclusion. Without a fit, it comes from the grid.

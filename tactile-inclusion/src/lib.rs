@@ -33,6 +33,7 @@
 mod covariance;
 mod design;
 mod estimate;
+mod first_fits;
 mod fit;
 mod forward;
 mod hypothesis;

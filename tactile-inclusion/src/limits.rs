@@ -1,11 +1,12 @@
 //! The smallest inclusion that can be found at each position.
 
+use crate::first_fits::HomogeneousFit;
 use crate::forward::{Forward, Solved};
 use crate::hypothesis::Assessed;
 use crate::parameters::{LumpParameters, Parameters};
 use crate::progress::Counter;
 use crate::scan::Scan;
-use crate::search::{HomogeneousFit, InclusionSearch, USED_FACE};
+use crate::search::{InclusionSearch, USED_FACE};
 use core::ops::ControlFlow;
 use tactile_core::Progress;
 use tactile_elasticity::{ElasticityError, Quantity};

@@ -12,6 +12,12 @@ pub(crate) const DIAMETERS: [f64; 3] = [0.35, 0.65, 1.05];
 pub(crate) const DEPTHS: [f64; 3] = [0.15, 0.3, 0.55];
 const CONTRASTS: [f64; 2] = [2.5, 8.0];
 
+/// Contrast of a soft inclusion, and its contribution relative to that of one with the first
+/// contrast: (c − 1) / (1 + 0.4 (c − 1)) for a ball of contrast c in an incompressible body (J. D.
+/// Eshelby, Proc. R. Soc. A 241 (1957) 376). From stiff starts alone the fit of a wide soft
+/// inclusion does not converge.
+const SOFT: (f64, f64) = (0.4, -0.84);
+
 /// An inclusion in a block, with its pressures.
 #[derive(Debug, Clone)]
 pub(crate) struct GridStart {
@@ -53,16 +59,23 @@ pub(crate) fn starts(
                 if !counter.step() {
                     return None;
                 }
-                let parameters = with(contrast);
-                let Some(predicted) = forward.predict(&parameters) else {
+                let Some(predicted) = forward.predict(&with(contrast)) else {
                     continue;
                 };
                 let added = predicted.iter().zip(&none);
-                starts.push(GridStart {
-                    parameters,
-                    added: added.map(|(with, none)| with / none - 1.0).collect(),
-                    predicted,
+                let added: Vec<f64> = added.map(|(with, none)| with / none - 1.0).collect();
+                let soft = (contrast == CONTRASTS[0]).then(|| {
+                    let added = added.iter().map(|part| SOFT.1 * part);
+                    (SOFT.0, added.collect())
                 });
+                for (contrast, added) in [(contrast, added)].into_iter().chain(soft) {
+                    let pairs = added.iter().zip(&none);
+                    starts.push(GridStart {
+                        parameters: with(contrast),
+                        predicted: pairs.map(|(part, none)| (1.0 + part) * none).collect(),
+                        added,
+                    });
+                }
             }
         }
     }
