@@ -3,6 +3,10 @@
 
 use nalgebra::{Point, SMatrix, SVector};
 
+/// Coordinates are clamped to this number of radii, which is as good as infinity. The square is
+/// still finite in single precision.
+pub(crate) const FARTHEST: f64 = 1e12;
+
 /// The map `x ↦ (x − centre) / scale`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Frame<const D: usize> {

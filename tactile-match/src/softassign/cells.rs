@@ -121,5 +121,12 @@ impl<const D: usize> Cells<D> {
     }
 }
 
+/// The points of both sets, to be found by their place.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LookUp<const D: usize> {
+    pub model: Cells<D>,
+    pub targets: Cells<D>,
+}
+
 #[cfg(test)]
 mod tests;

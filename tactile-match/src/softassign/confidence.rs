@@ -3,9 +3,9 @@
 
 use super::assign::SoftAssignment;
 use super::odds::{Fitted, PairOdds};
-use super::problem::Problem;
+use super::problem::{MIN_TELLING_GAIN, Problem};
+use super::race::{Outcome, Runner};
 use super::run::Run;
-use super::search::{Outcome, Runner};
 use super::{Mechanism, squared_distance};
 use crate::{Doubt, Judgement, MatchReport, Outliers, StopReason, linear_assignment};
 
@@ -26,25 +26,11 @@ pub(super) struct Answer<const D: usize> {
 /// An answer is read at this multiple of the lowest temperature or above: the truncation of the
 /// prior's factor must not cost a clean pair its match.
 const READ: f64 = 1.4;
-/// Minimum log-likelihood gain per point over a uniform target distribution. Wrong basins have a
-/// negative gain.
-pub(super) const MIN_TELLING_GAIN: f64 = 0.2;
-
 /// Spread of the soft partners, relative to the temperature, above which the pairs are undecided,
 /// however high their individual confidences. At 0.45 nineteen of twenty pairs are correct; at 0.55
 /// a surface of 5,000 points has slipped along itself
 /// (`--example large_sets -- 5000 surface 0.002 0.1`).
 const MOST_AMBIGUOUS: f64 = 0.5;
-
-/// Whether parts of one set are occluded or randomly scattered.
-pub(super) fn are_unequal(model: usize, target: usize) -> bool {
-    // If the smaller set has less than this fraction of the larger set's points, parts are occluded
-    // or scattered. The edge of the smaller set then attracts the points behind it, and the match
-    // can shift by one point. An answer is accepted without doubt only if its likelihood gain is
-    // high. A smaller limit misses more of these shifts; a larger one costs noisy scenes further
-    // starts (`--example confidence`).
-    (model.min(target) as f64) < 0.95 * model.max(target) as f64
-}
 
 /// Maximum number of costs in a completion: 8 MB and a tenth of a second.
 const MAX_COMPLETED: usize = 1_000_000;

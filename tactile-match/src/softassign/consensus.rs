@@ -2,8 +2,7 @@
 
 use super::difference;
 use super::problem::Problem;
-use super::run::{Annealer, Run};
-use super::search::SCALES;
+use super::run::{Annealer, Run, SCALES};
 use crate::gaussian_process::{Axes, Prior, PriorScales};
 use std::f64::consts::TAU;
 

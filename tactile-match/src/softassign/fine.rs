@@ -2,8 +2,6 @@
 //! points accordingly.
 
 use super::run::Run;
-use super::search::Race;
-use super::{Mechanism, Search};
 use super::{difference, in_space, squared, squared_distance};
 use crate::hard::nearest;
 use crate::judgement::median_of_chi_squared;
@@ -42,10 +40,10 @@ const SHAPES: [Shape; 6] = [
 
 /// Number of pairs whose likelihood decides about the noise: the 60 nearest to the centre. They
 /// determine the noise to 7 %; twice as many take eight times as long.
-const PATCH: usize = 60;
+pub(super) const PATCH: usize = 60;
 
 /// Sets up to this size are fitted as a whole: their dense system takes a tenth of a second.
-const MAX_WHOLE: usize = 600;
+pub(super) const MAX_WHOLE: usize = 600;
 
 /// λ = 4ᵏ, from the rounding of the covariances to a field that is affine compared with its noise.
 const POWERS: std::ops::RangeInclusive<i32> = -20..=6;
@@ -71,66 +69,30 @@ pub(super) struct FineFit<const D: usize> {
     pub(super) sigma: Option<f64>,
     /// Variance of the positions along an axis. Empty if the positions do not come from the fit.
     pub(super) variance: Vec<f64>,
-    pairs: Vec<(usize, usize)>,
+    pub(super) pairs: Vec<(usize, usize)>,
     sample: Vec<(usize, usize)>,
     distances: Vec<f64>,
     system: System<D>,
-}
-
-impl<const D: usize> Race<'_, D> {
-    /// Whether the residuals of decided pairs are noise. If so, the best run gets the noise and the
-    /// positions.
-    pub(super) fn resolve(&mut self) -> bool {
-        let problem = self.problem;
-        self.runner.fine.forget();
-        // A dense fit takes many times as long as the single run of a nearby search.
-        let thorough = problem.options.search == Search::Thorough;
-        let small = self.best.sigma <= problem.limits.clean || self.is_cold();
-        if !(thorough && problem.bends() && self.has(Mechanism::Fine) && small) {
-            return false;
-        }
-        // Decided partners are at most this far from their targets.
-        let reach = if self.is_exact() {
-            0.0
-        } else {
-            0.3 * problem.spacing
-        };
-        let whole = problem.model.len() <= MAX_WHOLE;
-        let (fine, best) = (&mut self.runner.fine, &mut *self.best);
-        let (model, target) = (&*problem.model, &*problem.target);
-        fine.pair(model, &best.warped, target, reach);
-        let sets = (model, &*best.base, target);
-        let most = if whole { f64::INFINITY } else { PATCH as f64 };
-        let enough = 0.9 * most.min(problem.smaller() as f64);
-        let are_enough = |fine: &FineFit<D>| fine.pairs.len() as f64 >= enough;
-        let noisy = are_enough(fine) && fine.are_noisy(sets) && are_enough(fine);
-        // Chance partners within that reach look like noise of at least twice this size.
-        let small = reach == 0.0 || fine.sigma.is_some_and(|sigma| sigma < 0.25 * reach);
-        if !(noisy && small && whole) {
-            return false;
-        }
-        fine.place(model, best);
-        if best.sigma > problem.limits.clean {
-            // The annealing resolves this noise, and its average over scales is more accurate.
-            best.noisy = false;
-            fine.forget();
-        }
-        true
-    }
 }
 
 /// Model, its positions under a start, and targets.
 type Sets<'a, const D: usize> = (&'a [[f64; D]], &'a [[f64; D]], &'a [[f64; D]]);
 
 impl<const D: usize> FineFit<D> {
-    fn forget(&mut self) {
+    pub(super) fn forget(&mut self) {
         (self.found, self.sigma) = (false, None);
         self.variance.clear();
     }
 
     /// Mutual nearest neighbours of warped points and targets, of all points or of those next to
     /// the centre. A pair must be nearer than `reach` or six times the median.
-    fn pair(&mut self, model: &[[f64; D]], warped: &[[f64; D]], target: &[[f64; D]], reach: f64) {
+    pub(super) fn pair(
+        &mut self,
+        model: &[[f64; D]],
+        warped: &[[f64; D]],
+        target: &[[f64; D]],
+        reach: f64,
+    ) {
         self.pairs.clear();
         self.pairs.extend((0..model.len()).map(|i| (i, 0)));
         if model.len() > MAX_WHOLE {
@@ -152,7 +114,7 @@ impl<const D: usize> FineFit<D> {
 
     /// Whether the residuals of the pairs are noise. Pairs that contradict the others are dropped.
     /// The fit of all pairs stays in `system`.
-    fn are_noisy(&mut self, sets: Sets<'_, D>) -> bool {
+    pub(super) fn are_noisy(&mut self, sets: Sets<'_, D>) -> bool {
         for _ in 0..3 {
             self.found = false;
             // Fewer pairs cannot separate noise from bending.
@@ -257,7 +219,7 @@ impl<const D: usize> FineFit<D> {
     }
 
     /// Moves the points to the positions of the fit.
-    fn place(&mut self, model: &[[f64; D]], run: &mut Run<D>) {
+    pub(super) fn place(&mut self, model: &[[f64; D]], run: &mut Run<D>) {
         let sigma = self.system.noise();
         self.sigma = Some(sigma);
         (run.sigma, run.noisy) = (sigma, true);

@@ -1,13 +1,13 @@
 //! Matching of large sets, from coarse to fine.
 
-use super::blocks::Blocks;
-use super::problem::{Problem, typical_spacing};
-use super::run::{Annealer, Cooling, Run, Schedule};
-use super::search::{MAX_PATTERN_REACH, Race, Runner, SCALES};
+use super::levels::STEP;
+use super::patterns::MAX_PATTERN_REACH;
+use super::problem::Problem;
+use super::race::{Race, Runner};
+use super::run::{Cooling, SCALES, Schedule};
 use super::starts::FAST;
 use super::{Mechanism, Rotation, squared_distance, starts};
 use crate::Doubt;
-use crate::gaussian_process::{Axes, Prior};
 use std::ops::ControlFlow;
 
 // Large sets are matched from coarse to fine.
@@ -280,82 +280,4 @@ fn agreement<const D: usize>(
     };
     let agreeing = pairs.iter().zip(warped).filter(near).count();
     agreeing as f64 / pairs.len().max(1) as f64
-}
-
-// Samples of large sets, and the extension of fields from one sample to the next.
-
-/// Number of points of a level per point of the next coarser level.
-const STEP: usize = 8;
-
-/// Samples of both sets, and the positions found by the coarser level.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Levels<const D: usize> {
-    pub(super) model_order: Blocks<D>,
-    target_order: Blocks<D>,
-    model: Vec<[f64; D]>,
-    target: Vec<[f64; D]>,
-    /// Positions of all model points under the start.
-    base: Vec<[f64; D]>,
-    coarse: Run<D>,
-    weights: Vec<f64>,
-    wanted: Axes<D>,
-    /// The prior at the points whose patterns are compared.
-    sampled: Prior,
-    /// Spacing of the targets of the current level.
-    spacing: f64,
-    distances: Vec<f64>,
-}
-
-impl<const D: usize> Levels<D> {
-    /// Takes the sample of every `stride`-th point (all points in their own order for a stride of
-    /// 1). Also sets the base positions of the sample in `run`.
-    fn sample(&mut self, problem: &Problem<D>, stride: usize, run: &mut Run<D>) {
-        let (model, target) = (&problem.model, &problem.target);
-        run.base.clear();
-        self.model.clear();
-        self.target.clear();
-        if stride == 1 {
-            run.base.extend_from_slice(&self.base);
-            self.model.extend_from_slice(model);
-            self.target.extend_from_slice(target);
-        } else {
-            let rows = self.model_order.order.iter().step_by(stride);
-            run.base.extend(rows.clone().map(|&i| self.base[i]));
-            self.model.extend(rows.map(|&i| model[i]));
-            let rows = self.target_order.order.iter().step_by(stride);
-            self.target.extend(rows.map(|&j| target[j]));
-        }
-        self.spacing = typical_spacing(&self.target, &mut self.distances);
-    }
-
-    /// Extends the field of `coarse`, every `step`-th point of the level of this stride, to all
-    /// points of that level. The result is in `run.warped`.
-    fn extend(&mut self, annealer: &mut Annealer<D>, stride: usize, step: usize, run: &mut Run<D>) {
-        let padded = annealer.prior.stride;
-        let order = &self.model_order.order;
-        let row_of = |coarse: usize| match stride {
-            1 => order[coarse * step],
-            _ => coarse * step,
-        };
-        self.weights.clear();
-        self.weights.resize(padded, 0.0);
-        self.wanted.fill(padded, run.base.iter().map(|_| [0.0; D]));
-        for (k, (warped, base)) in self.coarse.warped.iter().zip(&self.coarse.base).enumerate() {
-            let row = row_of(k);
-            self.weights[row] = 1.0;
-            for d in 0..D {
-                self.wanted.0[d][row] = warped[d] - base[d];
-            }
-        }
-        // Variance of the coarse field's values during the extension: the truncation error of its
-        // factor.
-        annealer
-            .regression
-            .fit(&annealer.prior, &self.weights, &self.wanted, 1e-6);
-        let field = &annealer.regression.displacement;
-        run.warped.clear();
-        let rows = run.base.iter().enumerate();
-        run.warped
-            .extend(rows.map(|(i, b)| std::array::from_fn(|d| b[d] + field.0[d][i])));
-    }
 }

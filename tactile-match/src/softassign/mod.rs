@@ -15,7 +15,7 @@
 //!
 //! ```text
 //! problem ← both sets in one frame, and the options            problem
-//! for (start, schedule) in starts:                             search
+//! for (start, schedule) in starts:                             search, race
 //!     place the model by the start                             starts, motion, patterns, tuples, correspond
 //!     while the temperature falls:                             run
 //!         M ← soft assignment of the predicted positions       assign
@@ -50,11 +50,13 @@ mod consensus;
 mod correspond;
 mod fine;
 mod large;
+mod levels;
 mod motion;
 mod odds;
 mod options;
 mod patterns;
 mod problem;
+mod race;
 mod result;
 mod rigid;
 mod rivals;
@@ -75,8 +77,8 @@ use crate::{MatchError, MatchedPairs, Matching, StopReason, WarmStart, Watch};
 use confidence::Answer;
 use nalgebra::{Point, SVector, Vector3};
 use problem::Problem;
+use race::{Outcome, Race, Runner};
 use run::Run;
-use search::{Outcome, Race, Runner};
 use series::Series;
 use std::ops::ControlFlow;
 

@@ -29,6 +29,10 @@ pub(super) struct LocalPatterns<const D: usize> {
     spacing: f64,
 }
 
+/// Largest distance of targets with which the pattern of a point is compared, in radii of the
+/// model.
+pub(super) const MAX_PATTERN_REACH: f64 = 0.25;
+
 /// Neighbours per point, for each dimension.
 const NEIGHBOURS: usize = 4;
 /// Maximum distance of a neighbour's target from its expected position, in spacings.

@@ -3,7 +3,7 @@
 use super::options::Slack;
 use super::run::{Cooling, Run, Schedule};
 use super::{AnnealedSoftassign, Transformation, squared_distance};
-use crate::frame::centre_and_radius;
+use crate::frame::{FARTHEST, centre_and_radius};
 use crate::{MatchError, error};
 use nalgebra::{Point, SVector};
 
@@ -53,6 +53,10 @@ const RESOLUTION: [f64; 2] = [0.01, 0.2];
 const DENSE: usize = 500;
 /// If both sets have at least this many points, they are matched coarse to fine.
 pub(super) const LARGE: usize = 4000;
+
+/// Minimum log-likelihood gain per point over a uniform target distribution. Wrong basins have a
+/// negative gain.
+pub(super) const MIN_TELLING_GAIN: f64 = 0.2;
 
 /// Number of targets whose nearest-neighbour distances determine the typical one.
 const SAMPLE: usize = 101;
@@ -182,6 +186,16 @@ impl<const D: usize> Problem<D> {
     }
 }
 
+/// Whether parts of one set are occluded or randomly scattered.
+pub(super) fn are_unequal(model: usize, target: usize) -> bool {
+    // If the smaller set has less than this fraction of the larger set's points, parts are occluded
+    // or scattered. The edge of the smaller set then attracts the points behind it, and the match
+    // can shift by one point. An answer is accepted without doubt only if its likelihood gain is
+    // high. A smaller limit misses more of these shifts; a larger one costs noisy scenes further
+    // starts (`--example confidence`).
+    (model.min(target) as f64) < 0.95 * model.max(target) as f64
+}
+
 /// Distance between neighbours of `points` points that fill a volume.
 fn mean_spacing<const D: usize>(volume: f64, points: usize) -> f64 {
     (volume / points as f64).powf(1.0 / D as f64)
@@ -220,10 +234,6 @@ pub(super) fn typical_spacing<const D: usize>(
         0.0
     }
 }
-
-/// Coordinates are clamped to this number of radii, which is as good as infinity. The square is
-/// still finite in single precision.
-pub(super) const FARTHEST: f64 = 1e12;
 
 /// The centroids and the unit of length inside the matcher.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,7 @@
 //! Rigid motions, similarities and affine maps in place of a smooth warp.
 
-use super::problem::FARTHEST;
 use super::{Transformation, in_space};
+use crate::frame::FARTHEST;
 use crate::gaussian_process::{Axes, Regression};
 use nalgebra::{Matrix3, Point, SMatrix, SVector, SymmetricEigen, Vector3};
 use tactile_tps::{Affine, Warp};

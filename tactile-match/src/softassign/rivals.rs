@@ -1,8 +1,7 @@
 //! Rivals of an answer: the model rotated, mirrored or shifted by a step of its lattice.
 
-use super::cells::Cells;
+use super::race::{Race, Runner};
 use super::run::Cooling;
-use super::search::{Race, Runner};
 use super::starts::FAST;
 use super::{Mechanism, Rotation, difference, mean, squared, starts};
 use crate::Doubt;
@@ -64,13 +63,6 @@ const FOLLOW: Cooling = Cooling {
     stuck: 12,
     ..FAST
 };
-
-/// The points of both sets, to be found by their place.
-#[derive(Clone, Debug, Default)]
-pub(super) struct LookUp<const D: usize> {
-    model: Cells<D>,
-    targets: Cells<D>,
-}
 
 /// The reflection at the first axis.
 fn mirror<const D: usize>() -> SMatrix<f64, D, D> {

@@ -5,11 +5,18 @@ use super::difference;
 use super::options::Slack;
 use super::rigid::RigidFit;
 use crate::Watch;
-use crate::gaussian_process::{Axes, Prior, Regression, Request};
+use crate::gaussian_process::{Axes, Prior, PriorScales, Regression, Request};
 use crate::judgement::median_of_chi_squared;
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 use tactile_core::statistics::median;
+
+/// Scales of the prior in the search.
+pub(super) const SCALES: PriorScales = PriorScales {
+    length: 1.2,
+    bending: 0.35,
+    affine: 0.5,
+};
 
 /// Cooling schedule of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,146 +1,23 @@
-//! The search: a race of runs from a list of starts, compared by evidence, until an answer leaves
-//! no doubt.
+//! The search: runs from a list of starts, compared by evidence, until an answer leaves no doubt.
 //!
 //! Most scenes are easy and end with the first, fast run. If its answer does not fit exactly and
 //! noise does not explain its residuals, further starts follow, from the cheapest to the most
 //! expensive. The run with the lowest energy wins. For noisy scenes the scales of the prior are then
 //! averaged.
 
-use super::confidence::{self, MIN_TELLING_GAIN};
-use super::consensus::Consensus;
-use super::correspond::Correspondence;
-use super::fine::FineFit;
-use super::large::Levels;
-use super::motion::Motions;
-use super::patterns::LocalPatterns;
-use super::problem::Problem;
-use super::rivals::LookUp;
-use super::run::{Annealer, Cooling, Run, Schedule};
-use super::scales::ScaleAverage;
-use super::starts::{FAST, MOVED, NEAR, OPEN, REHEAT, SLOW, Start, further_starts};
-use super::tuples::Tuples;
-use super::{Mechanism, Rotation, Search, starts};
-use crate::gaussian_process::PriorScales;
-use crate::{Doubt, Watch};
-use nalgebra::SVector;
+use super::problem::{MIN_TELLING_GAIN, are_unequal};
+use super::race::{Outcome, Race, Runner};
+use super::run::{Cooling, Run, SCALES};
+use super::starts::{FAST, MOVED, NEAR, OPEN, Start, further_starts};
+use super::{Mechanism, Rotation, Search};
+use crate::Doubt;
 use std::ops::ControlFlow;
 
-/// Scales of the prior in the search.
-pub(super) const SCALES: PriorScales = PriorScales {
-    length: 1.2,
-    bending: 0.35,
-    affine: 0.5,
-};
-/// Largest distance of targets with which the pattern of a point is compared, in radii of the
-/// model.
-pub(super) const MAX_PATTERN_REACH: f64 = 0.25;
-
-/// First temperature of a start from the motions, relative to the distance that four in five points
-/// do not exceed: the remaining points are twice as far.
-const MISSES: f64 = 2.0;
-/// Lowest such temperature, in mean spacings: it allows for bending between the blocks.
-const COLDEST: f64 = 0.1;
-/// Minimum fraction of the points in view that an answer from the block motions matches: more may
-/// be missing on either side.
-const FOLLOWED: f64 = 0.75;
-/// A larger fraction of unexplained residuals comes from a displaced part: noise explains one
-/// residual in a thousand, and swaps of random points a few.
-const LEAST_ASIDE: f64 = 0.02;
 /// If soft partners spread more than this, relative to the temperature, the evidence of a warp is
 /// hidden by that of its matches.
 const MOST_SPREAD: f64 = 0.3;
-/// If an answer in space from the motions of blocks has residuals below this, in spacings, no
-/// further start is needed.
-const SLIPPED: f64 = 0.15;
-/// Error of a block's motion, in spacings.
-const MOTION_ERROR: f64 = 0.15;
-/// Working memory of the runs. No run depends on what another has left here.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Runner<const D: usize> {
-    pub annealer: Annealer<D>,
-    /// The current run.
-    pub run: Run<D>,
-    /// The best run from the motions of blocks, while the other starts are tried.
-    followed: Run<D>,
-    correspondence: Correspondence,
-    pub patterns: LocalPatterns<D>,
-    pub lookup: LookUp<D>,
-    pub consensus: Consensus<D>,
-    tuples: Tuples<D>,
-    pub scales: ScaleAverage<D>,
-    pub fine: FineFit<D>,
-    pub levels: Levels<D>,
-    motions: Motions<D>,
-    /// Vectors from a model point to its neighbours.
-    pub steps: Vec<SVector<f64, D>>,
-}
 
-impl<const D: usize> Runner<D> {
-    /// Prepares prior and targets for all points.
-    fn prepare(&mut self, problem: &Problem<D>) {
-        self.annealer
-            .enter(problem, &problem.model, &problem.target);
-    }
-}
-
-impl<const D: usize> Annealer<D> {
-    /// Prepares prior and targets for these points of the sets.
-    pub(super) fn enter(&mut self, problem: &Problem<D>, model: &[[f64; D]], target: &[[f64; D]]) {
-        // In large sets smaller Gaussians are dropped. This changes the positions by a thousandth of
-        // the temperature.
-        self.soft.faintest = if problem.is_large() { 1e-4 } else { 1e-6 };
-        self.soft.set_targets(target);
-        self.prior.build(model, SCALES);
-        self.rigid.set(problem.options.transformation, model);
-    }
-}
-
-/// What a search has found, beside its best run.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Outcome {
-    /// Number of runs.
-    pub starts: usize,
-    /// Whether the caller stopped it.
-    pub stopped: bool,
-    /// Another answer that fits as well, or better but is excluded by the options.
-    pub rival: Option<Doubt>,
-    /// Whether all rotations are allowed and one maps the model onto itself.
-    pub symmetric: bool,
-}
-
-/// A search: a race of runs. The best so far wins.
-pub(super) struct Race<'a, const D: usize> {
-    pub problem: &'a Problem<D>,
-    pub runner: &'a mut Runner<D>,
-    /// The best run so far.
-    pub best: &'a mut Run<D>,
-    pub watch: Watch<'a>,
-    /// Number of runs.
-    pub starts: usize,
-    /// Number of points matched by the best run before the last one.
-    matched_before: f64,
-}
-
-impl<'a, const D: usize> Race<'a, D> {
-    pub(super) fn new(
-        problem: &'a Problem<D>,
-        runner: &'a mut Runner<D>,
-        best: &'a mut Run<D>,
-        watch: Watch<'a>,
-    ) -> Self {
-        runner.scales.spread.clear();
-        (best.matched, best.energy) = (0.0, f64::INFINITY);
-        (best.noisy, best.far) = (false, false);
-        Self {
-            problem,
-            runner,
-            best,
-            watch,
-            starts: 0,
-            matched_before: 0.0,
-        }
-    }
-
+impl<const D: usize> Race<'_, D> {
     /// Searches for the best run, which stays in `best`. Returns a rival of it.
     pub(super) fn go(&mut self) -> ControlFlow<(), Option<Doubt>> {
         if self.problem.is_large() {
@@ -225,10 +102,6 @@ impl<'a, const D: usize> Race<'a, D> {
         ControlFlow::Continue(rival)
     }
 
-    pub(super) fn has(&self, mechanism: Mechanism) -> bool {
-        self.problem.options.has(mechanism)
-    }
-
     /// Tries the starts that do not use the unmoved sets, until the best run leaves no doubt.
     fn try_starts(&mut self) -> ControlFlow<()> {
         self.run(Start::Centred, FAST)?;
@@ -252,196 +125,27 @@ impl<'a, const D: usize> Race<'a, D> {
         ControlFlow::Continue(())
     }
 
-    /// Runs from a start. Does nothing if the sets have no such start.
-    fn run(&mut self, start: Start<D>, cooling: Cooling) -> ControlFlow<()> {
-        if !self.place(start)? {
-            return ControlFlow::Continue(());
+    /// Whether no further start can do better. The best run is exact, or the residuals of a dense
+    /// set are so far below its spacing that no part can be displaced, or noise explains residuals
+    /// and soft partners.
+    fn is_done(&self) -> bool {
+        let (problem, best) = (self.problem, &*self.best);
+        if best.far || self.is_exact() {
+            return !best.far;
         }
-        let sigma = match start {
-            Start::Moved => self.warmth(),
-            _ => cooling.sigma,
-        };
-        self.anneal(Cooling { sigma, ..cooling })
-    }
-
-    /// Sets the current run to a start: base and warped positions. Returns `false` if the sets have
-    /// no such start.
-    fn place(&mut self, start: Start<D>) -> ControlFlow<(), bool> {
-        const NO_START: ControlFlow<(), bool> = ControlFlow::Continue(false);
-        let problem = self.problem;
-        let (model, target, spacing) = (&*problem.model, &*problem.target, problem.spacing);
-        let Runner {
-            annealer,
-            run,
-            patterns,
-            consensus,
-            tuples,
-            correspondence,
-            levels,
-            ..
-        } = &mut *self.runner;
-        match start {
-            Start::Best => {
-                run.copy_from(self.best);
-                return ControlFlow::Continue(true);
-            }
-            Start::Patterns => {
-                run.copy_from(self.best);
-                let (rows, reach) = (0..model.len(), MAX_PATTERN_REACH);
-                let sets = (&*run.warped, target);
-                if !patterns.propose(rows, sets, spacing, reach, self.watch)? {
-                    return NO_START;
-                }
-                consensus.fit(annealer, problem, model, &patterns.pairs, run);
-                return ControlFlow::Continue(true);
-            }
-            Start::Moved => {
-                if problem.is_dense() {
-                    levels.model_order.build(model);
-                }
-                return self.place_by_motions();
-            }
-            Start::Centred => run.base.clone_from(&problem.model),
-            Start::Moments(rotation) => {
-                starts::moments(model, target, &rotation, &mut run.base);
-            }
-            Start::Tuples => {
-                let limited = problem.options.rotation == Rotation::Limited;
-                let (base, still) = (&mut run.base, problem.frame.still());
-                if !tuples.find((model, target), spacing, limited, &still, base, self.watch)? {
-                    return NO_START;
-                }
-            }
-            Start::Labelling => {
-                // If noise hides the correspondence, the surroundings of the points hold no
-                // information.
-                let hidden = self.best.ambiguity >= 0.8 && self.best.sigma >= 0.999 * REHEAT.sigma;
-                if hidden && problem.bends() {
-                    return NO_START;
-                }
-                run.base.clone_from(&problem.model);
-                correspondence.find(&run.base, target, self.watch)?;
-                consensus.fit(annealer, problem, model, &correspondence.pairs, run);
-                return ControlFlow::Continue(true);
-            }
+        let matched = best.matched / problem.smaller() as f64;
+        if problem.is_dense() {
+            let complete = matched >= self.wanted_share();
+            return best.sigma <= 0.15 * problem.spacing && complete && best.tail <= 0.01;
         }
-        run.warped.clone_from(&run.base);
-        ControlFlow::Continue(true)
-    }
-
-    /// Moves the current run by the motions of the blocks. Returns `false` if they do not agree on a
-    /// field.
-    pub(super) fn place_by_motions(&mut self) -> ControlFlow<(), bool> {
-        let problem = self.problem;
-        let Runner {
-            annealer,
-            run,
-            levels,
-            motions,
-            ..
-        } = &mut *self.runner;
-        let still = problem.frame.still();
-        let as_it_lies = |p: &[f64; D]| std::array::from_fn(|k| p[k] + still[k]);
-        run.base.clear();
-        run.base.extend(problem.model.iter().map(as_it_lies));
-        let spacing = problem.mean_spacing;
-        let sets = (&*run.base, &*problem.target);
-        let order = &levels.model_order.order;
-        if !motions.find(sets, order, spacing, problem.farthest, self.watch)? {
-            return ControlFlow::Continue(false);
-        }
-        let mean = SVector::from(motions.mean());
-        for p in &mut run.base {
-            *p = (SVector::from(*p) + mean).into();
-        }
-        let Annealer {
-            weights,
-            residuals,
-            prior,
-            regression,
-            rigid,
-            ..
-        } = annealer;
-        weights.clear();
-        weights.resize(prior.stride, 0.0);
-        residuals.fill(prior.stride, run.base.iter().map(|_| [0.0; D]));
-        let seeds = motions.seeds.iter();
-        for (row, motion) in seeds.filter_map(|seed| Some((seed.row, seed.value()?))) {
-            weights[row] = 1.0;
-            for k in 0..D {
-                residuals.0[k][row] = motion[k] - mean[k];
-            }
-        }
-        let variance = (MOTION_ERROR * spacing).powi(2);
-        if problem.bends() {
-            regression.fit(prior, weights, residuals, variance);
-        } else {
-            rigid.fit(weights, &run.base, residuals, variance, regression);
-        }
-        let field = &regression.displacement.0;
-        run.warped.clear();
-        let rows = run.base.iter().enumerate();
-        let moved = rows.map(|(i, b)| std::array::from_fn(|k| b[k] + field[k][i]));
-        run.warped.extend(moved);
-        ControlFlow::Continue(true)
-    }
-
-    /// Temperature of a start from the motions of blocks: at most their error. At a higher
-    /// temperature, sets that already coincide would drift along a lattice.
-    pub(super) fn warmth(&mut self) -> f64 {
-        let spacing = self.problem.mean_spacing;
-        let Runner { motions, run, .. } = &mut *self.runner;
-        let miss = motions.miss(&run.warped, &self.problem.target, spacing);
-        (MISSES * miss).clamp(COLDEST * spacing, MOVED.sigma * spacing)
-    }
-
-    /// Anneals the current run, and keeps it if it is the best so far.
-    fn anneal(&mut self, cooling: Cooling) -> ControlFlow<()> {
-        self.matched_before = self.best.matched;
-        let run = &mut self.runner.run;
-        (run.energy, run.tail) = (f64::INFINITY, 0.0);
-        let flow = self.anneal_only(cooling);
-        let (problem, run) = (self.problem, &mut self.runner.run);
-        run.far = problem.is_far(&run.warped);
-        if self.starts == 1 {
-            self.best.copy_from(run);
-            if self.is_exact() {
-                return flow; // no other run follows to compare it with
-            }
-        }
-        let Runner { run, annealer, .. } = &mut *self.runner;
-        run.tail = annealer.tail(0.1 * problem.spacing);
-        annealer.evaluate(run, problem.slack(), problem.limits.resolution);
-        if run.far {
-            run.energy = f64::INFINITY;
-        }
-        if run.energy < self.best.energy || self.starts == 1 {
-            self.best.copy_from(run);
-        }
-        flow
-    }
-
-    /// Anneals the current run.
-    pub(super) fn anneal_only(&mut self, cooling: Cooling) -> ControlFlow<()> {
-        let smaller = self.problem.smaller() as f64;
-        let schedule = Schedule {
-            collapse: 0.5 * smaller,
-            partners: smaller,
-            ..self.problem.schedule(cooling)
-        };
-        self.starts += 1;
-        let Runner { run, annealer, .. } = &mut *self.runner;
-        run.trace.clear();
-        (run.iterations, run.noisy) = (0, false);
-        annealer.run(run, &schedule, self.watch)
-    }
-
-    /// The schedule at the temperature of the best run.
-    fn schedule_at_end(&self) -> Schedule {
-        self.problem.schedule(Cooling {
-            sigma: self.best.sigma,
-            ..SLOW
-        })
+        let unequal = are_unequal(problem.model.len(), problem.target.len());
+        let least = if unequal { 1.2 } else { MIN_TELLING_GAIN };
+        // Soft partners that spread less than this, relative to the temperature, are decided. For
+        // well separated points the spread is 0.05; if a part is displaced it is 0.12 to 0.6.
+        problem.gain(best).is_some_and(|gain| gain >= least)
+            && matched >= 0.9
+            && best.tail <= 0.03
+            && best.ambiguity <= 0.1
     }
 
     /// Averages over the scales of the prior by their evidence, twice: the first average changes
@@ -470,80 +174,5 @@ impl<'a, const D: usize> Race<'a, D> {
         let scale = noise(best);
         scales.average(annealer.request(), model, best, scale, true, self.watch)?;
         ControlFlow::Continue(())
-    }
-
-    /// Whether no further start can do better. The best run is exact, or the residuals of a dense
-    /// set are so far below its spacing that no part can be displaced, or noise explains residuals
-    /// and soft partners.
-    fn is_done(&self) -> bool {
-        let (problem, best) = (self.problem, &*self.best);
-        if best.far || self.is_exact() {
-            return !best.far;
-        }
-        let matched = best.matched / problem.smaller() as f64;
-        if problem.is_dense() {
-            let complete = matched >= self.wanted_share();
-            return best.sigma <= 0.15 * problem.spacing && complete && best.tail <= 0.01;
-        }
-        let unequal = confidence::are_unequal(problem.model.len(), problem.target.len());
-        let least = if unequal { 1.2 } else { MIN_TELLING_GAIN };
-        // Soft partners that spread less than this, relative to the temperature, are decided. For
-        // well separated points the spread is 0.05; if a part is displaced it is 0.12 to 0.6.
-        problem.gain(best).is_some_and(|gain| gain >= least)
-            && matched >= 0.9
-            && best.tail <= 0.03
-            && best.ambiguity <= 0.1
-    }
-
-    /// Whether the best run so far fits nearly all points of the smaller set to rounding.
-    pub(super) fn is_exact(&self) -> bool {
-        let (problem, best) = (self.problem, &*self.best);
-        !best.far
-            && best.sigma <= problem.limits.clean
-            && best.matched >= self.wanted_share() * problem.smaller() as f64
-            && (best.tail <= 0.01 || !problem.is_dense())
-    }
-
-    /// Whether a run from the motions of blocks kept their matches. If so, nearly all points within
-    /// the box of the targets have a partner, and the pairs make the targets likelier than chance.
-    pub(super) fn is_likely(&self) -> bool {
-        let (problem, best) = (self.problem, &*self.best);
-        let sides: [_; D] = std::array::from_fn(|k| {
-            let values = problem.target.iter().map(|t| t[k]);
-            values.fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)))
-        });
-        let inside = |w: &&[f64; D]| (0..D).all(|k| sides[k].0 <= w[k] && w[k] <= sides[k].1);
-        let inside = best.warped.iter().filter(inside).count() as f64;
-        let gain = problem.gain(best).unwrap_or(f64::INFINITY);
-        // A surface that slipped along itself leaves residuals of a fifth of a spacing, as noise
-        // does.
-        let near = D == 2 || best.sigma <= SLIPPED * problem.spacing;
-        problem.is_dense()
-            && near
-            && !best.far
-            && best.matched >= FOLLOWED * inside
-            && 2.0 * inside > problem.smaller() as f64
-            && gain >= MIN_TELLING_GAIN
-            && best.tail <= LEAST_ASIDE
-    }
-
-    /// Whether the best run so far ended below the noise and so lost some of its pairs.
-    pub(super) fn is_cold(&self) -> bool {
-        let smaller = self.problem.smaller() as f64;
-        self.best.sigma < 0.1 * self.problem.spacing && self.best.matched < 0.95 * smaller
-    }
-
-    /// Fraction of the smaller set that a complete answer matches. Dense sets may hold points that
-    /// occur in one of them only. This is accepted once a further start from the patterns matches no
-    /// more points, because the first such start leaves the edges of a cropped set shifted by one
-    /// point.
-    fn wanted_share(&self) -> f64 {
-        // Smaller changes of the number come from the temperature.
-        let grows = self.best.matched > 1.005 * self.matched_before;
-        if self.problem.is_dense() && self.starts >= 3 && !grows {
-            0.8
-        } else {
-            0.98
-        }
     }
 }
