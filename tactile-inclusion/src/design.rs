@@ -2,8 +2,8 @@
 
 use crate::covariance::{Observed, Resolution};
 use crate::fit::Problem;
+use crate::inclusion_search::InclusionSearch;
 use crate::parameters::{BLOCK, LumpParameters};
-use crate::search::InclusionSearch;
 use crate::tissue_block::check_approaches;
 use tactile_elasticity::{ElasticityError, Quantity};
 

@@ -5,9 +5,9 @@ use crate::covariance::{Observed, Resolution};
 use crate::fit::{ANSWER_ENDING, FIRST_FIT_ENDING, Fit, Prior, Problem};
 use crate::forward::Forward;
 use crate::hypothesis::{Hypothesis, LEAST_GAIN, Score, better};
+use crate::inclusion_search::InclusionSearch;
 use crate::parameters::Parameters;
 use crate::progress::Counter;
-use crate::search::InclusionSearch;
 use crate::starts::{GridStart, starts};
 use tactile_fem::{Interface, Kinematics};
 

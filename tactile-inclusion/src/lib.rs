@@ -37,6 +37,7 @@ mod first_fits;
 mod fit;
 mod forward;
 mod hypothesis;
+mod inclusion_search;
 mod limits;
 mod pair;
 mod parameters;
@@ -53,8 +54,8 @@ pub use estimate::{
     Estimated, Identifiable, Inclusion, InclusionEstimate, InclusionWarning, SearchVerdict,
     asymmetry_warnings,
 };
+pub use inclusion_search::InclusionSearch;
 pub use scan::{Scan, ScanPress};
-pub use search::InclusionSearch;
 pub use tactile_core::Progress;
 pub use tissue_block::{PressureProfile, SensorErrors, TissueBlock};
 

@@ -3,10 +3,10 @@
 use crate::first_fits::HomogeneousFit;
 use crate::forward::{Forward, Solved};
 use crate::hypothesis::Assessed;
+use crate::inclusion_search::{InclusionSearch, USED_FACE};
 use crate::parameters::{LumpParameters, Parameters};
 use crate::progress::Counter;
 use crate::scan::Scan;
-use crate::search::{InclusionSearch, USED_FACE};
 use core::ops::ControlFlow;
 use tactile_core::Progress;
 use tactile_elasticity::{ElasticityError, Quantity};
