@@ -190,7 +190,7 @@ fn print(answer: Option<&Answer>, context: &mut Context) {
         let share = digits(100.0 * share, 2);
         context.row(
             "lens",
-            format_args!("1 % of distortion at the corners is {share} % of the force"),
+            format_args!("the force changes by {share} % for 1 % of distortion at the corners"),
         );
     }
 }

@@ -305,10 +305,10 @@ pub(crate) fn run(arguments: &MeasureArguments, context: &mut Context) -> Result
         let [force, pixel_size, distortion] =
             [force, pixel_size, distortion].map(|change| digits(100.0 * change, 2));
         context.row(
-            "per cent",
+            "sensitivity",
             format_args!(
-                "1 % of the forces is {force} % of the modulus, of the pixel size {pixel_size} %, \
-                 of distortion at the corners {distortion} %"
+                "the modulus changes by {force} % for forces 1 % larger, by {pixel_size} % for \
+                 pixels 1 % larger, by {distortion} % for 1 % of distortion at the corners"
             ),
         );
     }
