@@ -330,9 +330,9 @@ impl IlluminationDrift {
     }
 
     /// Fits illumination and stray light to the tiles whose residual level per pixel is within a
-    /// limit. A line through their changes over the reference reveals which of them changed; otherwise the
-    /// change is attributed to the illumination. `sd` is the noise of a pixel, and `scatter` the
-    /// ratio of the tiles' scatter to the noise of a tile. Returns the number of tiles.
+    /// limit. A line through their changes over the reference reveals which of them changed;
+    /// otherwise the change is attributed to the illumination. `sd` is the noise of a pixel, and
+    /// `scatter` the ratio of the tiles' scatter to the noise of a tile. Returns the number of tiles.
     fn step_both(&mut self, tiles: &Levels<'_>, limit: f64, sd: f64, scatter: f64) -> usize {
         let (mut count, mut pixels, mut sums) = (0, 0.0, [0.0; 8]);
         // The preceding tile stands for the structure of the reference: the change of a tile

@@ -49,8 +49,8 @@ struct Candidate {
 
 impl<const D: usize> LocalPatterns<D> {
     /// Finds `pairs` for some model rows, in their order, for model points that a first warp has
-    /// moved to `warped`. `spacing` is that of the targets. Candidates are at most `reach` away. Returns `false` if the sets have no
-    /// meaningful spacing.
+    /// moved to `warped`. `spacing` is that of the targets. Candidates are at most `reach` away.
+    /// Returns `false` if the sets have no meaningful spacing.
     pub(super) fn propose(
         &mut self,
         rows: impl Iterator<Item = usize>,
