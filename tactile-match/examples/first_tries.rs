@@ -149,7 +149,7 @@ fn lattice(
     }
     let (target, partner) = shuffle(&after, before.len(), &mut stream);
     let name = format!(
-        "{} noise {noise} turn {turn} shift {shift}",
+        "{} noise {noise} turn {turn:.2} shift {shift:.2}",
         if hex { "hex" } else { "square" }
     );
     judge(tally, &name, &before, &target, &partner, 0.99)

@@ -254,7 +254,13 @@ impl<const D: usize> Race<'_, D> {
         let Runner { run, annealer, .. } = &mut *self.runner;
         run.trace.clear();
         run.iterations = 0;
-        annealer.run(run, &schedule, self.watch)
+        let flow = annealer.run(run, &schedule, self.watch);
+        if flow.is_break() && run.base.len() == self.problem.model.len() {
+            // The positions of all points so far are the answer of a search that was stopped.
+            self.best.copy_from(run);
+            self.starts = 1;
+        }
+        flow
     }
 }
 

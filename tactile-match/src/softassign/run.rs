@@ -179,7 +179,10 @@ impl<const D: usize> Annealer<D> {
             }
             state.iterations += 1;
             state.trace.push(self.free_energy(state, variance));
-            watch()?;
+            if watch().is_break() {
+                (state.sigma, state.ambiguity) = (variance.sqrt(), self.ambiguity);
+                return ControlFlow::Break(());
+            }
             let floor = schedule.floor.powi(2);
             // Temperatures (variances) below this are cold: a tenth of the model's radius.
             if variance < 0.01 && state.matched < schedule.collapse {

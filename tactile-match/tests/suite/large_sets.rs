@@ -152,6 +152,35 @@ fn a_caller_who_stops_has_an_answer_for_every_point() {
     assert!(found.warped().all(|p| p.coords.norm() < 10.0));
 }
 
+/// A search that is stopped while it anneals all points keeps the motions that it has found.
+#[test]
+fn a_caller_who_stops_late_has_the_best_answer_so_far() {
+    let scene = scene::<2>(0.0, 0);
+    let matcher = AnnealedSoftassign::default();
+    let mut workspace = SoftassignWorkspace::default();
+    let mut stopped_at = |last: usize| {
+        let mut heard = 0;
+        let watch = || {
+            heard += 1;
+            match heard >= last {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
+        };
+        let found = matcher
+            .match_points_with(&mut workspace, &scene.model, &scene.target, watch)
+            .expect("good points");
+        let share = right(&scene, &found.assignment);
+        (heard, found.report.stop, share)
+    };
+    let (all, _, complete) = stopped_at(usize::MAX);
+    let (_, stop, share) = stopped_at(all - 2);
+    println!("{all} calls, {complete} right, {share} right of the stopped search");
+    assert_eq!(stop, StopReason::Cancelled);
+    // Two calls before its end the search has annealed to a fraction of the spacing.
+    assert!(complete > 0.99 && share > 0.9, "{complete} {share}");
+}
+
 #[test]
 fn a_grown_workspace_allocates_nothing_and_gives_the_same_bits() {
     let scene = scene::<3>(0.0, 0);
