@@ -319,10 +319,8 @@ impl Stages {
     /// Whether a frame without contact, darker than the reference by this on average, has lost its
     /// light: the camera dropped it, or the lamps were off.
     pub(super) fn is_black(&self, step_grey: f64) -> bool {
-        let image = self.reference.image();
-        let light = || image.iter().map(|v| f64::from(*v)).sum::<f64>() / image.len() as f64;
         // Less than half a grey level is the smallest drift that is named.
-        step_grey < -0.5 && step_grey < -LEAST_LOSS * light()
+        step_grey < -0.5 && step_grey < -LEAST_LOSS * self.reference.mean_grey()
     }
 
     /// The cautions about all frames: about the calibration, and the change of the light since.

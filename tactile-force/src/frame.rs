@@ -504,7 +504,16 @@ impl ReferenceFrame {
     }
 
     /// Mean grey level of the image.
-    pub(crate) fn mean_grey(&self) -> f64 {
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_force::ReferenceFrame;
+    /// let reference = ReferenceFrame::new(Array2::from_elem((40, 60), 7).view())?;
+    /// assert_eq!(reference.mean_grey(), 7.0);
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
+    #[must_use]
+    pub fn mean_grey(&self) -> f64 {
         self.sum as f64 / self.image.len() as f64
     }
 
