@@ -170,12 +170,11 @@ fn a_caller_who_stops_late_has_the_best_answer_so_far() {
         let found = matcher
             .match_points_with(&mut workspace, &scene.model, &scene.target, watch)
             .expect("good points");
-        let share = right(&scene, &found.assignment);
+        let share = right(&scene, found.assignment);
         (heard, found.report.stop, share)
     };
     let (all, _, complete) = stopped_at(usize::MAX);
     let (_, stop, share) = stopped_at(all - 2);
-    println!("{all} calls, {complete} right, {share} right of the stopped search");
     assert_eq!(stop, StopReason::Cancelled);
     // Two calls before its end the search has annealed to a fraction of the spacing.
     assert!(complete > 0.99 && share > 0.9, "{complete} {share}");
