@@ -87,6 +87,31 @@ pub(crate) fn centre_and_radius<const D: usize>(
     (centre, largest * (squares / n).sqrt())
 }
 
+/// Median nearest-neighbour distance of about `sample` points of a set. Zero for a single point.
+/// `distances` is working memory. `O(n)` for each point of the sample.
+pub(crate) fn typical_spacing<const D: usize>(
+    points: &[[f64; D]],
+    sample: usize,
+    distances: &mut Vec<f64>,
+) -> f64 {
+    let square =
+        |a: &[f64; D], b: &[f64; D]| (SVector::from(*a) - SVector::from(*b)).norm_squared();
+    distances.clear();
+    let step = points.len().div_ceil(sample);
+    distances.extend((0..points.len()).step_by(step).map(|i| {
+        let others = points[..i].iter().chain(&points[i + 1..]);
+        let squares = others.map(|p| square(p, &points[i]));
+        squares.fold(f64::INFINITY, f64::min)
+    }));
+    let middle = distances.len() / 2;
+    let spacing = *distances.select_nth_unstable_by(middle, f64::total_cmp).1;
+    if spacing.is_finite() {
+        spacing.sqrt()
+    } else {
+        0.0
+    }
+}
+
 /// Covariance of a position drawn from these points with their weights. Zero if the weights sum to
 /// zero.
 pub(crate) fn spread<const D: usize>(

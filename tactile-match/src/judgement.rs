@@ -1,7 +1,7 @@
 //! Whether the pairs of an answer are reliable: named doubts, and a judgement of pairs that come
 //! without a likelihood.
 
-use crate::frame::centre_and_radius;
+use crate::frame::{centre_and_radius, typical_spacing};
 use nalgebra::{Point, SMatrix, SVector};
 use tactile_core::statistics::median;
 
@@ -197,7 +197,9 @@ impl Judgement {
         let step = pairs.len().div_ceil(SAMPLE).max(1);
         let sample = (0..pairs.len()).step_by(step);
         let misfits: Vec<f64> = sample.filter_map(|row| misfit(&pairs, row)).collect();
-        let spacing = typical_spacing(target) / scale;
+        let scaled = target.iter().map(|y| (y - target[0]) / scale);
+        let scaled: Vec<[f64; D]> = scaled.map(Into::into).collect();
+        let spacing = typical_spacing(&scaled, SAMPLE, &mut Vec::new());
         if misfits.is_empty() || spacing <= 0.0 {
             return Self::NotJudged;
         }
@@ -302,19 +304,6 @@ fn repeats<const D: usize>(
     let mut outward = [0.0; 3];
     (0..D).for_each(|k| outward[k] = step[k]);
     Some(Doubt::Repeats { step: outward })
-}
-
-/// Median nearest-neighbour distance of the targets, over a sample.
-fn typical_spacing<const D: usize>(target: &[Point<f64, D>]) -> f64 {
-    let step = target.len().div_ceil(SAMPLE);
-    let nearest = |i: usize| {
-        let others = target.iter().enumerate().filter(|&(j, _)| j != i);
-        let distances = others.map(|(_, t)| (t - target[i]).norm());
-        distances.fold(f64::INFINITY, f64::min)
-    };
-    let mut distances: Vec<f64> = (0..target.len()).step_by(step).map(nearest).collect();
-    let spacing = median(&mut distances);
-    if spacing.is_finite() { spacing } else { 0.0 }
 }
 
 /// Median of the sum of `dimension` squared standard normal deviates, by the approximation of

@@ -32,53 +32,22 @@
 //! is the reference, and [`RelaxationLabelling::with_candidates`] runs the same method over few
 //! candidates.
 
+pub(crate) mod graph;
+pub(crate) mod matrix;
 mod relaxation;
+
+pub use graph::Neighbourhood;
 
 use crate::assignment::assigned;
 use crate::error::{all_pairs, at_least_one, option_within, point_sets};
 use crate::frame::{Frame, spread};
 use crate::interpolation::spline;
 use crate::{Judgement, MatchError, Matching, StopReason, Watch};
+use matrix::MatchMatrix;
 use nalgebra::{Point, SVector};
-use relaxation::{MatchMatrix, NeighbourGraph, energy, relax};
+use relaxation::relax;
 use std::ops::ControlFlow;
 use tactile_tps::Smoothing;
-
-/// Selects the neighbours of a point.
-///
-/// ```
-/// use nalgebra::Point2;
-/// use tactile_match::labelling::Neighbourhood;
-/// use tactile_match::{PointMatcher, RelaxationLabelling};
-/// let model: Vec<_> = (0..12)
-///     .map(f64::from)
-///     .map(|k| Point2::new(k % 4.0 + 0.2 * (3.0 * k).sin(), (k / 4.0).floor()))
-///     .collect();
-/// let target: Vec<_> = model
-///     .iter()
-///     .map(|p| Point2::new(p.x + 0.1 * p.y, p.y))
-///     .collect();
-/// for neighbourhood in [Neighbourhood::MedianRadius, Neighbourhood::Nearest(4)] {
-///     let options = RelaxationLabelling::default().with_neighbourhood(neighbourhood)?;
-///     let found = options.match_points(&model, &target)?;
-///     assert!((0..12).all(|i| found.assignment[i] == Some(i)));
-/// }
-/// # Ok::<(), tactile_match::MatchError>(())
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Neighbourhood {
-    /// All points within the median of all pairwise distances of the set, the median included, as
-    /// in the paper.
-    ///
-    /// Distances that exceed the median only by rounding count as equal to it, so that the ties of
-    /// a regular grid do not depend on the grid's position.
-    #[default]
-    MedianRadius,
-    /// The `k` nearest points. Among equal distances the lower rows come first. If there are fewer
-    /// points, all of them.
-    Nearest(usize),
-}
 
 /// The set of edges over which the maximum in α (15) is taken.
 ///
@@ -382,7 +351,7 @@ impl RelaxationLabelling {
         };
         let (start, goal) = (enter(&frames[0], model), enter(&frames[1], target));
         let mut run = Run {
-            matches: MatchMatrix::zeros(start.len(), goal.len()),
+            matches: MatchMatrix::without_candidates(start.len(), goal.len()),
             warped: start.clone(),
             model: start,
             target: goal,
@@ -420,22 +389,20 @@ struct Run<const D: usize> {
 impl<const D: usize> Run<D> {
     /// Computes the match matrix of the current sets and its energy (14).
     fn relax(&mut self, options: &RelaxationLabelling, watch: Watch<'_>) -> ControlFlow<()> {
-        self.matches = relax(options, &self.warped, &self.target, watch)?;
-        let graph = |points: &Vec<_>| NeighbourGraph::new(points, options.neighbourhood);
-        let [x, y] = [&self.warped, &self.target].map(graph);
-        self.energy.push(energy(&self.matches, &x, &y, watch)?);
+        let (matches, energy) = relax(options, &self.warped, &self.target, watch)?;
+        self.matches = matches;
+        self.energy.push(energy);
         ControlFlow::Continue(())
     }
 
     /// Mean partner of model point `i`, and its weight: one minus the slack.
     fn partner(&self, i: usize) -> (SVector<f64, D>, f64) {
-        let weights = &self.matches.row(i)[..self.target.len()];
-        let mass: f64 = weights.iter().sum();
-        let sum = self
-            .target
-            .iter()
-            .zip(weights)
-            .fold(SVector::zeros(), |sum, (y, &w)| sum + y.coords * w);
+        let (sum, mass) = self
+            .matches
+            .row(i)
+            .fold((SVector::zeros(), 0.0), |(sum, mass), (j, w)| {
+                (sum + self.target[j].coords * w, mass + w)
+            });
         if mass > 0.0 {
             (sum / mass, mass)
         } else {
@@ -471,14 +438,19 @@ impl<const D: usize> Run<D> {
     /// Distinct partners with the largest sum of probabilities. `None` if the slack is likelier.
     fn assignment(&self, watch: Watch<'_>) -> Vec<Option<usize>> {
         let (rows, columns) = (self.model.len(), self.target.len());
+        let mut entries = vec![0.0; rows * columns];
+        for i in 0..rows {
+            for (j, p) in self.matches.row(i) {
+                entries[i * columns + j] = p;
+            }
+        }
+        let entry = |i, j| entries[i * columns + j];
         // The costs are probabilities, hence finite.
-        let cost = |i, j| -self.matches[(i, j)];
-        let mut assignment =
-            assigned([rows, columns], cost, watch).unwrap_or_else(|_| vec![None; rows]);
+        let mut assignment = assigned([rows, columns], |i, j| -entry(i, j), watch)
+            .unwrap_or_else(|_| vec![None; rows]);
         for (i, partner) in assignment.iter_mut().enumerate() {
-            let slack = self.matches[(i, columns)];
-            *partner =
-                partner.filter(|&j| self.matches[(i, j)] > 0.0 && self.matches[(i, j)] >= slack);
+            let slack = self.matches.slack(i);
+            *partner = partner.filter(|&j| entry(i, j) > 0.0 && entry(i, j) >= slack);
         }
         assignment
     }
@@ -502,17 +474,17 @@ impl<const D: usize> Run<D> {
         let warped: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
         let mut found = Matching::new(target, warp, warped, assignment);
         for (i, partner) in found.assignment.iter().enumerate() {
-            let row = &self.matches.row(i)[..target.len()];
+            let (row, slack) = (|| self.matches.row(i), self.matches.slack(i));
             // Sinkhorn's normalisation ends with the columns, so a row may sum to slightly more
             // than one.
-            let sum = self.matches.row(i).iter().sum::<f64>().max(1.0);
+            let sum = (row().map(|pair| pair.1).sum::<f64>() + slack).max(1.0);
             // Soft matches below this weight are dropped.
-            let kept = row.iter().copied().enumerate().filter(|p| p.1 > 1e-4);
+            let kept = row().filter(|p| p.1 > 1e-4);
             found.soft.push_row(kept.map(|(j, p)| (j, p / sum)));
-            let sure = partner.map_or(self.matches[(i, target.len())], |j| row[j]);
-            found.confidence.push(sure / sum);
-            let places = target.iter().map(|y| y - target[0]);
-            let covariance = spread(places.zip(row.iter().copied()));
+            let surest = |on| row().find(|&(j, _)| j == on).map_or(0.0, |pair| pair.1);
+            found.confidence.push(partner.map_or(slack, surest) / sum);
+            let places = row().map(|(j, p)| (target[j] - target[0], p));
+            let covariance = spread(places);
             found.displacement_covariance.push(covariance);
         }
         found.report.judgement = Judgement::of_pairs(model, target, &found.assignment);

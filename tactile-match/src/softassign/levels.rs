@@ -1,8 +1,9 @@
 //! Samples of large sets, and the extension of fields from one sample to the next.
 
 use super::blocks::Blocks;
-use super::problem::{Problem, typical_spacing};
+use super::problem::{Problem, SAMPLE};
 use super::run::{Annealer, Run};
+use crate::frame::typical_spacing;
 use crate::gaussian_process::{Axes, Prior};
 
 /// Number of points of a level per point of the next coarser level.
@@ -46,7 +47,7 @@ impl<const D: usize> Levels<D> {
             let rows = self.target_order.order.iter().step_by(stride);
             self.target.extend(rows.map(|&j| target[j]));
         }
-        self.spacing = typical_spacing(&self.target, &mut self.distances);
+        self.spacing = typical_spacing(&self.target, SAMPLE, &mut self.distances);
     }
 
     /// Extends the field of `coarse`, every `step`-th point of the level of this stride, to all

@@ -3,7 +3,7 @@
 use super::options::Slack;
 use super::run::{Cooling, Run, Schedule};
 use super::{AnnealedSoftassign, Transformation, squared_distance};
-use crate::frame::{FARTHEST, centre_and_radius};
+use crate::frame::{FARTHEST, centre_and_radius, typical_spacing};
 use crate::{MatchError, error};
 use nalgebra::{Point, SVector};
 
@@ -59,7 +59,7 @@ pub(super) const LARGE: usize = 4000;
 pub(super) const MIN_TELLING_GAIN: f64 = 0.2;
 
 /// Number of targets whose nearest-neighbour distances determine the typical one.
-const SAMPLE: usize = 101;
+pub(super) const SAMPLE: usize = 101;
 
 impl Limits {
     fn of(spacing: f64) -> Self {
@@ -112,7 +112,7 @@ impl<const D: usize> Problem<D> {
         self.volume = bounding_volume(&self.target, frame.target_radius);
         self.mean_spacing = mean_spacing::<D>(self.volume, target.len());
         self.limits = Limits::of(mean_spacing::<D>(self.volume, self.smaller()));
-        self.spacing = typical_spacing(&self.target, &mut self.distances);
+        self.spacing = typical_spacing(&self.target, SAMPLE, &mut self.distances);
         self.farthest = options.largest_motion / frame.scale;
         Ok(())
     }
@@ -211,28 +211,6 @@ fn bounding_volume<const D: usize>(points: &[[f64; D]], radius: f64) -> f64 {
         (high - low).max(0.1)
     };
     (0..D).map(side).product()
-}
-
-/// Median nearest-neighbour distance of the targets, over a sample. Zero for a single point.
-/// `distances` is working memory.
-pub(super) fn typical_spacing<const D: usize>(
-    target: &[[f64; D]],
-    distances: &mut Vec<f64>,
-) -> f64 {
-    let step = target.len().div_ceil(SAMPLE);
-    distances.clear();
-    distances.extend((0..target.len()).step_by(step).map(|i| {
-        let others = target.iter().enumerate().filter(|&(j, _)| j != i);
-        let squares = others.map(|(_, t)| squared_distance(t, &target[i]));
-        squares.fold(f64::INFINITY, f64::min)
-    }));
-    let middle = distances.len() / 2;
-    let spacing = *distances.select_nth_unstable_by(middle, f64::total_cmp).1;
-    if spacing.is_finite() {
-        spacing.sqrt()
-    } else {
-        0.0
-    }
 }
 
 /// The centroids and the unit of length inside the matcher.

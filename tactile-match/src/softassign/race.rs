@@ -42,7 +42,7 @@ pub(super) struct Runner<const D: usize> {
     pub run: Run<D>,
     /// The best run from the motions of blocks, while the other starts are tried.
     pub followed: Run<D>,
-    correspondence: Correspondence,
+    correspondence: Correspondence<D>,
     pub patterns: LocalPatterns<D>,
     pub lookup: LookUp<D>,
     pub consensus: Consensus<D>,
