@@ -166,22 +166,14 @@ impl<const D: usize> Tuples<D> {
             if count < D {
                 continue;
             }
-            for code in 0..count.pow(D as u32) {
-                let mut rest = code;
-                let mut images = SMatrix::<f64, D, D>::zeros();
-                let mut used = [usize::MAX; D];
-                let mut distinct = true;
-                for axis in 0..D {
-                    let choice = rest % count;
-                    rest /= count;
-                    distinct &= !used[..axis].contains(&choice);
-                    used[axis] = choice;
-                    images.set_column(axis, &self.offered[choice]);
-                }
-                if !distinct {
+            for choice in choices::<D>(count) {
+                if (1..D).any(|axis| choice[..axis].contains(&choice[axis])) {
                     continue;
                 }
-                let linear = images * inverse;
+                let mut linear = SMatrix::<f64, D, D>::zeros();
+                for axis in 0..D {
+                    linear += self.offered[choice[axis]] * inverse.row(axis);
+                }
                 if !plausible(&linear, limited) {
                     continue;
                 }
@@ -360,13 +352,7 @@ fn best_basis<const D: usize>(
 ) -> Option<([usize; D], SMatrix<f64, D, D>)> {
     let count = offsets.len().min(2 * D + 2);
     let mut best = (0.0, None);
-    for code in 0..count.pow(D as u32) {
-        let mut rest = code;
-        let mut chosen = [0; D];
-        for slot in &mut chosen {
-            *slot = rest % count;
-            rest /= count;
-        }
+    for chosen in choices::<D>(count) {
         // Each choice in one order only.
         if chosen.windows(2).any(|pair| pair[0] >= pair[1]) {
             continue;
@@ -402,18 +388,37 @@ pub(super) fn volume<const D: usize>(m: &SMatrix<f64, D, D>) -> f64 {
     }
 }
 
+/// All choices of D among `count`, repetitions and all orders included.
+fn choices<const D: usize>(count: usize) -> impl Iterator<Item = [usize; D]> {
+    std::iter::successors((count > 0).then_some([0; D]), move |last| {
+        let mut next = *last;
+        for place in &mut next {
+            *place += 1;
+            if *place < count {
+                return Some(next);
+            }
+            *place = 0;
+        }
+        None
+    })
+}
+
 /// Whether a body could follow a local map: no reflection, no stretch out of range, and no large
 /// rotation if rotations are limited.
 fn plausible<const D: usize>(linear: &SMatrix<f64, D, D>, limited: bool) -> bool {
     let [low, high] = STRETCH;
+    let squares = low * low..=high * high;
     for k in 0..D {
-        if limited && linear[(k, k)] < 0.5 * linear.column(k).norm() {
+        let (column, row) = (
+            linear.column(k).norm_squared(),
+            linear.row(k).norm_squared(),
+        );
+        let along = linear[(k, k)];
+        if limited && (along < 0.0 || along * along < 0.25 * column) {
             return false;
         }
-        for v in [linear.column(k).norm(), linear.row(k).norm()] {
-            if !(low..=high).contains(&v) {
-                return false;
-            }
+        if !(squares.contains(&column) && squares.contains(&row)) {
+            return false;
         }
     }
     volume(linear) > low.powi(D as i32 - 1)
