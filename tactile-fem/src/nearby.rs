@@ -5,7 +5,6 @@ use crate::material::Material;
 use crate::model::{ElementModel, ModelFields};
 use crate::recovery::PressurePoint;
 use crate::scene::{AppliedLoad, FemScene, Outcome};
-use crate::slide::Relaxation;
 use crate::sparse::Factors;
 use crate::state::{State, pressure_at};
 use crate::system::{Layout, Slot, Tangent};
@@ -82,10 +81,6 @@ impl FrameResponse {
         pressure_at(&self.pressure, radius_m)
     }
 }
-
-/// Number of rounds in which the faces of slightly changed scenes are realigned. Each leaves a
-/// tenth of the previous distance.
-const SLIDING_ROUNDS: usize = 2;
 
 /// A scene with an interface, solved at several approaches. Nearby scenes on the same mesh are
 /// solved from it in fewer iterations, and it gives derivatives by any change of a scene.
@@ -198,21 +193,14 @@ impl SolvedFrames {
             };
             let mut found = solve(&nearby)?;
             if let Some(depth) = self.sliding_depth {
-                let mut relaxations = vec![Relaxation::default(); nearby.len()];
-                for _ in 0..SLIDING_ROUNDS {
-                    let met = scene.distances(&found[nearby.len()].displacement);
-                    for ((nearby, found), relaxation) in
-                        nearby.iter_mut().zip(&found).zip(&mut relaxations)
-                    {
-                        let apart = nearby.distances(&found.displacement);
-                        let mut apart: Vec<f64> =
-                            apart.iter().zip(&met).map(|(a, b)| a - b).collect();
-                        let parts = relaxation.next(apart.iter().copied());
-                        apart.iter_mut().zip(parts).for_each(|(a, part)| *a *= part);
-                        *nearby = nearby.moved_back(&apart, depth)?;
-                    }
-                    found = solve(&nearby)?;
+                // Realigns the faces of the changed scenes: a tenth of the distance remains.
+                let met = scene.distances(&found[nearby.len()].displacement);
+                for (nearby, found) in nearby.iter_mut().zip(&found) {
+                    let apart = nearby.distances(&found.displacement);
+                    let apart: Vec<f64> = apart.iter().zip(&met).map(|(a, b)| a - b).collect();
+                    *nearby = nearby.moved_back(&apart, depth)?;
                 }
+                found = solve(&nearby)?;
             }
             for (answers, found) in answers.iter_mut().zip(found) {
                 answers.push(found);

@@ -122,6 +122,18 @@ impl ElementModel {
         }
     }
 
+    /// The state of a model without contacts at an approach, by simplified Newton iterations from a
+    /// nearby state of a model with the same elements. `None` if they do not converge.
+    pub(crate) fn solve_from(
+        &self,
+        layout: &mut Layout,
+        near: &State,
+        approach: f64,
+    ) -> Option<State> {
+        let found = simplified(self, layout, &near.fields, approach, &mut 0)?;
+        Some(State::new(self, &found))
+    }
+
     /// Total height of all bodies.
     fn height(&self) -> f64 {
         let heights = || self.nodes.iter().map(|node| node[1]);

@@ -82,27 +82,39 @@ impl FemScene {
             None => self.clone(),
         };
         let guess = near.map_or(&[][..], |(_, state)| core::slice::from_ref(state));
-        let mut solve = |model: &ElementModel, guess: &[State]| {
-            model.solve_near(layout, &load, guess).states.pop()
-        };
-        let mut state = solve(&scene.model, guess)?;
-        let mut relaxation = Relaxation::default();
+        let mut state = (scene.model.solve_near(layout, &load, guess).states).pop()?;
+        let mut last: Vec<[f64; 2]> = Vec::new();
         let mut before = f64::INFINITY;
         let mut part_moved = 1.0;
         for _ in 0..MAX_ROUNDS {
             let pairs = scene.model.pairs();
             let radius =
                 |node: usize| scene.model.nodes[node][0] + state.fields.displacement[2 * node];
-            let apart = |pair: &Pair| radius(pair.upper) - radius(pair.lower);
             let face = pairs
                 .iter()
                 .map(|pair| radius(pair.lower))
                 .fold(0.0, f64::max);
-            let left = |pair: &Pair| {
+            let mut moves = Vec::with_capacity(pairs.len());
+            let mut shifts = Vec::with_capacity(pairs.len());
+            for (k, pair) in pairs.iter().enumerate() {
+                let [upper, lower] =
+                    [pair.upper, pair.lower].map(|node| scene.model.nodes[node][0]);
+                let apart = radius(pair.upper) - radius(pair.lower);
+                let by = part_moved * secant_part(apart, last.get(k)) * apart;
+                moves.push([apart, by]);
+                shifts.push([lower, upper - lower - by]);
+            }
+            limit_growth(&mut shifts);
+            let mut left = 0.0_f64;
+            for ((pair, [lower, shift]), [apart, by]) in pairs.iter().zip(&shifts).zip(&mut moves) {
+                let moved = scene.model.nodes[pair.upper][0] - lower - shift;
                 let is_rim = radius(pair.lower) > RIM_LIMIT * face;
-                apart(pair).abs() / (if is_rim { RIM_MET } else { MET } * face)
-            };
-            let left = pairs.iter().map(left).fold(0.0, f64::max);
+                let tolerance = if is_rim { RIM_MET } else { MET } * face;
+                // A node that may not move further is not counted.
+                left = left.max((moved / *by * *apart / tolerance).abs());
+                *by = moved;
+            }
+            last = moves;
             if left > STALLED * before {
                 part_moved *= 0.5;
             }
@@ -110,21 +122,14 @@ impl FemScene {
                 break;
             }
             before = left;
-            let parts = relaxation.next(pairs.iter().map(apart));
-            let mut shifts = Vec::with_capacity(pairs.len());
-            for (pair, part) in pairs.iter().zip(parts) {
-                let [upper, lower] =
-                    [pair.upper, pair.lower].map(|node| scene.model.nodes[node][0]);
-                shifts.push([lower, upper - lower - part_moved * part * apart(pair)]);
-            }
-            limit_growth(&mut shifts);
-            let Some(next) = self.shifted(&shifts, depth_m) else {
+            let next = self.shifted(&shifts, depth_m).and_then(|next| {
+                let state = next.model.solve_from(layout, &state, approach_m)?;
+                Some((next, state))
+            });
+            let Some(next) = next else {
                 break;
             };
-            let Some(found) = solve(&next.model, core::slice::from_ref(&state)) else {
-                break;
-            };
-            (scene, state) = (next, found);
+            (scene, state) = next;
         }
         Some((scene, state))
     }
@@ -194,34 +199,19 @@ impl FemScene {
     }
 }
 
-/// Fraction of its distance by which the node of each pair is moved: a secant step, pair by pair.
+/// Fraction of its distance by which the node of a pair is moved: a secant step from its last
+/// distance and move.
 ///
 /// On a smooth face, a move by δ changes a distance by −δ. At the rim the move also changes the
 /// pressure, and the change is larger, by a factor of two at a tenth of the block's height. Full
 /// steps would never converge.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Relaxation {
-    /// Distance before the last move, and the fraction of it that was moved.
-    last: Vec<(f64, f64)>,
-}
-
-impl Relaxation {
-    /// The fraction of a distance by which a node is moved, from the last two distances.
-    pub(crate) fn next(&mut self, distances: impl Iterator<Item = f64>) -> Vec<f64> {
-        let mut last = core::mem::take(&mut self.last).into_iter();
-        for now in distances {
-            let part = last.next().map_or(1.0, |(before, part)| {
-                let secant = part * before / (before - now);
-                // Distances at rounding level give no secant.
-                if secant.is_finite() {
-                    secant.clamp(LEAST_PART, 1.0)
-                } else {
-                    1.0
-                }
-            });
-            self.last.push((now, part));
-        }
-        self.last.iter().map(|(_, part)| *part).collect()
+fn secant_part(distance: f64, last: Option<&[f64; 2]>) -> f64 {
+    let part = last.map_or(1.0, |[before, moved]| moved / (before - distance));
+    // Distances at rounding level give no secant.
+    if part.is_finite() {
+        part.clamp(LEAST_PART, 1.0)
+    } else {
+        1.0
     }
 }
 

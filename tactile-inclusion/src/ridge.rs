@@ -25,7 +25,10 @@ const MAX_NODES: usize = 8;
 
 /// Fall of ln p in one step above which the step was too long and is halved. For a Gaussian the
 /// second step falls by 2.2.
-const CLIFF: f64 = 3.0;
+const CLIFF: f64 = 4.0;
+
+/// Fall of ln p for which the length of a step is chosen.
+const STEP_FALL: f64 = 2.2;
 
 /// Fall of ln p at which a side ends: that of 2.4 standard errors. The slope is extrapolated from
 /// there.
@@ -37,12 +40,12 @@ const LARGEST_RIDGE_STEP: f64 = 1.0;
 /// Step along ln E₁, in units of its local standard error.
 const RIDGE_STEP: f64 = 1.2;
 
-/// Maximum number of fits on each side of the ridge.
+/// Maximum number of steps to the ridge at one E₁.
 const MAX_STEPS: usize = 4;
 
-/// Distance from the ridge, in standard errors, above which one step to it is not enough, and the
-/// number of steps then.
-const LONG: f64 = 1.0;
+/// Distance from the ridge, in standard errors, above which one step to it is not enough. A step of
+/// this length leaves an error of ln p of 0.2.
+const LONG: f64 = 3.0;
 
 /// Fall of ln p after the last node up to which its slope is extrapolated.
 const TAIL: f64 = 4.0;
@@ -94,6 +97,7 @@ impl Problem {
         let index = (self.coordinates().iter()).position(|c| *c == Coordinate::LumpModulus)?;
         let (node, start) = self.node(&fit.parameters, fit.normal.clone(), index)?;
         let top = node.density;
+        let mut first_bend = DVector::zeros(start.tangent.len());
         let mut nodes = vec![node];
         for sign in [-1.0, 1.0] {
             let mut place = Place {
@@ -102,11 +106,15 @@ impl Problem {
                 parameters: start.parameters.clone(),
                 ..start
             };
-            let mut part = 1.0;
-            let mut before = top;
+            let (mut part, mut before, mut bend) = (1.0, top, first_bend.clone());
+            // Slope of −ln p away from the optimum.
+            let mut slope = 0.0;
             for _ in 0..MAX_NODES {
-                let step = part * (RIDGE_STEP * place.error).min(LARGEST_RIDGE_STEP);
-                let at = self.stepped(&place.parameters, &(sign * step * &place.tangent));
+                let root = f64::hypot(slope, (2.0 * STEP_FALL).sqrt() / place.error);
+                let long = (2.0 * STEP_FALL / (slope + root)).min(RIDGE_STEP * place.error);
+                let step = sign * part * long.min(LARGEST_RIDGE_STEP);
+                let by = step * (&place.tangent + 0.5 * step * &bend);
+                let at = self.stepped(&place.parameters, &by);
                 let near = &place.solved;
                 let Some((node, next)) = self.settled_node(&at, near, index, &mut go_on) else {
                     break;
@@ -118,7 +126,12 @@ impl Problem {
                     part *= 0.5;
                     continue;
                 }
+                slope = (2.0 * (before - density) / step.abs() - slope).max(0.0);
                 before = density;
+                bend = (&next.tangent - &place.tangent) / step;
+                if nodes.len() == 1 {
+                    first_bend.clone_from(&bend);
+                }
                 part = (2.0 * part).min(1.0);
                 if sign < 0.0 {
                     nodes.insert(0, node);

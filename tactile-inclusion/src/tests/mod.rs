@@ -147,6 +147,31 @@ fn derivatives_without_friction_know_how_the_face_slides() {
     }
 }
 
+/// On a coarse mesh under a deep press the nodes of the rim cannot meet.
+#[test]
+fn a_sliding_face_settles_alike_from_any_start() {
+    let model = Forward {
+        interface: Interface::Frictionless,
+        approaches_m: vec![1.2e-3, 2.4e-3, 3.6e-3],
+        ..forward(3)
+    };
+    let here = Parameters {
+        lump: Some(lump(16.3e-3, 2.5e-3, 80e3)),
+        block_modulus_pa: 3.6e3,
+        height_m: 27e-3,
+        ..block()
+    };
+    let (_, solved) = model.predict_near(&here, None).unwrap();
+    let again = |by: f64| {
+        let there = here.moved(Coordinate::LumpModulus, by);
+        let (_, there) = model.predict_near(&there, Some(&solved)).unwrap();
+        model.predict_near(&here, Some(&there)).unwrap().0
+    };
+    // The tolerance of the faces is 2e-6 of the radius. If rounds end early, it is 2.5e-5.
+    let off = distance(&again(0.3)[..48], &again(-0.3)[..48]);
+    assert!(off < 4e-6, "{off}");
+}
+
 #[test]
 fn a_moved_mesh_is_as_good_as_a_new_one() {
     let model = forward(3);
