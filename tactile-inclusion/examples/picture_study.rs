@@ -1,7 +1,7 @@
 //! Errors of the search in the whole face, on a folder of blocks solved in three dimensions.
 //!
 //! ```text
-//! cargo run --release -p tactile-inclusion --example picture_study -- FOLDER [DRAWS] [NAMES] [scan] [hand]
+//! cargo run --release -p tactile-inclusion --example picture_study -- FOLDER [DRAWS] [NAMES] [scan] [hand] [wide]
 //! ```
 //!
 //! FOLDER contains `scenes.csv` and for every scene a file `NAME.csv` (load_index, x_m, y_m,
@@ -14,6 +14,10 @@
 //! presses of scans. Each draw has one to four presses in random directions from the lump, on cells
 //! of 2 mm, placed with an error of 0.2 mm. With `hand` this error is 2 mm, and each approach of
 //! each press has an error of 0.2 mm.
+//!
+//! With `wide`, each draw is a scan of 60 × 60 mm with five or nine presses, 22 mm apart along x and
+//! y. Those at two opposite corners have a lump beside them, on the outer side. The others show the
+//! scene `plain`.
 #![allow(clippy::print_stdout)]
 
 #[path = "inclusion_study/shared.rs"]
@@ -30,6 +34,9 @@ use tactile_inclusion::{
     Identifiable, Inclusion, InclusionSearch, PressureProfile, Scan, ScanPress, SensorErrors,
     TissueBlock,
 };
+
+/// Distance of neighbouring presses of a wide scan along x and y, in metres.
+const WIDE_STEP_M: f64 = 22e-3;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
@@ -142,17 +149,32 @@ struct Hand {
     each_approach_m: f64,
 }
 
-/// A press with the errors of the sensor: white noise of 0.75 % of the largest pressure on pixels of
-/// 86 µm, and the smooth errors of a calibration. The lump lies at an angle from the axis.
-fn press(
-    picture: &Picture,
+/// A press on this axis, with its lump at an angle from it.
+struct Placed<'a> {
+    picture: &'a Picture,
     angle: f64,
+    axis_m: [f64; 2],
+}
+
+impl Placed<'_> {
+    fn lump_m(&self) -> [f64; 2] {
+        let aside = self.picture.aside_m;
+        let [x, y] = self.axis_m;
+        [x + aside * self.angle.cos(), y + aside * self.angle.sin()]
+    }
+}
+
+/// A press with the errors of the sensor: white noise of 0.75 % of the largest pressure on pixels of
+/// 86 µm, and the smooth errors of a calibration.
+fn press(
+    placed: &Placed<'_>,
     stated_m: &[f64],
     common: &Field,
     hand: &Hand,
     rng: &mut ChaCha8Rng,
 ) -> ScanPress {
-    let (sine, cosine) = angle.sin_cos();
+    let picture = placed.picture;
+    let (sine, cosine) = placed.angle.sin_cos();
     let turned = |[x, y]: [f64; 2]| [x * cosine - y * sine, x * sine + y * cosine];
     let positions_m: Vec<[f64; 2]> = picture.positions_m.iter().map(|at| turned(*at)).collect();
     let sensor = SensorErrors::default();
@@ -181,8 +203,7 @@ fn press(
         }
     });
     let frames = frames.collect();
-    let axis_m =
-        [cosine, sine].map(|direction| -picture.aside_m * direction + hand.place_m * normal(rng));
+    let axis_m = placed.axis_m.map(|x| x + hand.place_m * normal(rng));
     ScanPress {
         axis_m,
         positions_m,
@@ -249,21 +270,46 @@ impl Tally {
     }
 }
 
-/// Searches presses of one lump in directions from it, and prints the results.
+/// Presses of a scan with two lumps, beside the presses at two opposite corners.
+fn wide<'a>(
+    pictures: &'a [Picture],
+    is_nine: bool,
+    rng: &mut ChaCha8Rng,
+) -> Outcome<Vec<Placed<'a>>> {
+    let (plain, others): (Vec<&Picture>, Vec<&Picture>) = (pictures.iter())
+        .partition(|picture| text(&picture.row, "scene").is_ok_and(|name| name == "plain"));
+    let plain = plain.first().ok_or("no plain block")?;
+    let lattice = (-1..=1).flat_map(|i: i32| (-1..=1).map(move |k: i32| [i, k]));
+    let pressed = lattice.filter(|[i, k]| is_nine || i.abs() == k.abs());
+    let placed = pressed.map(|[i, k]| {
+        let turn = core::f64::consts::FRAC_PI_2 * (rng.random::<f64>() - 0.5);
+        Placed {
+            picture: if i + k == 0 && i != 0 {
+                others[rng.random_range(0..others.len())]
+            } else {
+                plain
+            },
+            angle: f64::from(k).atan2(f64::from(i)) + turn,
+            axis_m: [i, k].map(|index| WIDE_STEP_M * f64::from(index)),
+        }
+    });
+    Ok(placed.collect())
+}
+
+/// Searches presses, and prints the results.
 fn search(
-    pictures: &[(&Picture, f64)],
+    pictures: &[Placed<'_>],
     stated_m: &[f64],
     hand: &Hand,
     rng: &mut ChaCha8Rng,
     tally: &mut Tally,
 ) -> Outcome<()> {
-    let (first, turn) = pictures[0];
-    let row = &first.row;
+    let row = &pictures[0].picture.row;
     let height = number(row, "block_height_m")? * (0.02 * normal(rng)).exp();
     let zero_m = 20e-6 * normal(rng);
     let common = Field::drawn(rng);
-    let presses = pictures.iter().map(|(picture, angle)| {
-        let mut press = press(picture, *angle, stated_m, &common, hand, rng);
+    let presses = pictures.iter().map(|placed| {
+        let mut press = press(placed, stated_m, &common, hand, rng);
         press
             .frames
             .iter_mut()
@@ -296,32 +342,35 @@ fn search(
         estimate.probability,
         estimate.misfit
     );
-    let axes = ["axis_x_m", "axis_y_m", "axis_z_m"].map(|name| number(row, name));
-    let [x, y, z] = axes;
-    let (x, y, z) = (x?, y?, z?);
-    let width = (x * y).sqrt();
-    let diameter = (x * y * z).cbrt();
-    let truth = [
-        diameter,
-        number(row, "depth_m")?,
-        number(row, "E1_pa")?,
-        z / width,
-    ];
-    let is_pair = number(row, "twin_at_minus_x")? > 0.0;
-    for inclusion in &estimate.inclusions() {
-        let place = |aside: f64| [aside * turn.cos(), aside * turn.sin()];
-        let mut centre_m = if is_single {
-            place(first.aside_m)
-        } else {
-            [0.0; 2]
-        };
-        if let Some([x, y]) = inclusion.position_m.filter(|_| is_pair) {
-            // The nearer lump of a pair.
-            if x.value * centre_m[0] + y.value * centre_m[1] < 0.0 {
-                centre_m = place(-first.aside_m);
-            }
+    // Place, D, d, E₁ and height over width of each lump.
+    let mut truths = Vec::new();
+    for placed in pictures {
+        let (row, lump_m) = (&placed.picture.row, placed.lump_m());
+        let axes = ["axis_x_m", "axis_y_m", "axis_z_m"].map(|name| number(row, name));
+        let [x, y, z] = axes;
+        let (x, y, z) = (x?, y?, z?);
+        let modulus = number(row, "E1_pa")?;
+        let diameter = (x * y * z).cbrt();
+        let aspect = z / (x * y).sqrt();
+        let truth = [diameter, number(row, "depth_m")?, modulus, aspect];
+        if modulus != number(row, "E0_pa")? {
+            truths.push((lump_m, truth));
         }
-        tally.add_lump(inclusion, centre_m, truth);
+        if number(row, "twin_at_minus_x")? > 0.0 {
+            truths.push((lump_m.map(|x| -x), truth));
+        }
+    }
+    for inclusion in &estimate.inclusions() {
+        let away = |place: [f64; 2]| {
+            let known = inclusion.position_m.map(|told| told.map(|x| x.value));
+            let [x, y] = known.unwrap_or(place);
+            (x - place[0]).hypot(y - place[1])
+        };
+        let nearest = (truths.iter()).min_by(|a, b| away(a.0).total_cmp(&away(b.0)));
+        match nearest {
+            Some((place, truth)) => tally.add_lump(inclusion, *place, *truth),
+            None => print!("; found where there is none"),
+        }
     }
     println!("; {:?}", estimate.warnings);
     Ok(())
@@ -330,9 +379,10 @@ fn search(
 fn main() -> Outcome<()> {
     let (words, mut arguments): (Vec<String>, Vec<String>) = std::env::args()
         .skip(1)
-        .partition(|word| word == "scan" || word == "hand");
+        .partition(|word| ["scan", "hand", "wide"].contains(&word.as_str()));
     arguments.resize(3, String::new());
-    let is_scan = words.contains(&"scan".to_owned());
+    let is_wide = words.contains(&"wide".to_owned());
+    let is_scan = is_wide || words.contains(&"scan".to_owned());
     let hand = if words.contains(&"hand".to_owned()) {
         Hand {
             place_m: 2e-3,
@@ -351,10 +401,10 @@ fn main() -> Outcome<()> {
     for row in table(&folder.join("scenes.csv"))? {
         let name = text(&row, "scene")?;
         if names.split(',').any(|begin| name.starts_with(begin)) {
-            let lump = if is_scan {
-                name.split("_x").next()
-            } else {
-                None
+            let lump = match (is_wide, is_scan) {
+                (true, _) => Some("wide"),
+                (_, true) => name.split("_x").next(),
+                _ => None,
             };
             let pictures = lumps.entry(lump.unwrap_or(name).to_owned()).or_default();
             pictures.push(Picture::new(folder, &row, if is_scan { 2 } else { 1 })?);
@@ -364,13 +414,26 @@ fn main() -> Outcome<()> {
     for (index, (name, pictures)) in lumps.iter().enumerate() {
         for draw in 0..draws {
             let mut rng = ChaCha8Rng::seed_from_u64(1000 * draw + index as u64);
-            let count = if is_scan { rng.random_range(1..=4) } else { 1 };
-            let mut chosen = Vec::new();
-            print!("{name} {draw}: presses");
+            let (mut chosen, count) = match (is_wide, is_scan) {
+                (true, _) => (wide(pictures, draw % 2 == 1, &mut rng)?, 0),
+                (_, true) => (Vec::new(), rng.random_range(1..=4)),
+                _ => (Vec::new(), 1),
+            };
             for _ in 0..count {
-                let picture = &pictures[rng.random_range(0..pictures.len())];
-                print!(" {:.0}", 1e3 * picture.aside_m);
-                chosen.push((picture, core::f64::consts::TAU * rng.random::<f64>()));
+                let mut placed = Placed {
+                    picture: &pictures[rng.random_range(0..pictures.len())],
+                    angle: core::f64::consts::TAU * rng.random::<f64>(),
+                    axis_m: [0.0; 2],
+                };
+                if count > 1 {
+                    // The lump of a scan is the origin.
+                    placed.axis_m = placed.lump_m().map(|x| -x);
+                }
+                chosen.push(placed);
+            }
+            print!("{name} {draw}: presses");
+            for placed in &chosen {
+                print!(" {:.0}", 1e3 * placed.picture.aside_m);
             }
             print!(" mm aside, ");
             // Scans have two approaches.

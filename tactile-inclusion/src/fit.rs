@@ -154,6 +154,12 @@ impl Problem {
         self.priors.iter().map(|prior| prior.coordinate).collect()
     }
 
+    /// Index of a coordinate among those fitted.
+    pub(crate) fn index(&self, coordinate: Coordinate) -> Option<usize> {
+        let mut priors = self.priors.iter();
+        priors.position(|prior| prior.coordinate == coordinate)
+    }
+
     pub(crate) fn residual(&self, predicted: &[f64]) -> DVector<f64> {
         DVector::from_iterator(
             self.measured.len(),
@@ -321,8 +327,7 @@ impl Problem {
             fix(&mut matrix, &mut gradient, held, 0.0);
         }
         let mut by = matrix.clone().cholesky()?.solve(&gradient);
-        let poisson = |prior: &Prior| prior.coordinate == Coordinate::PoissonRatio;
-        if let Some(k) = self.priors.iter().position(poisson) {
+        if let Some(k) = self.index(Coordinate::PoissonRatio) {
             // If only ν were limited, the step would not lower the objective: the steps of the
             // others must be those for ν at its limit.
             let room = LARGEST_POISSON_RATIO - parameters.poisson_ratio;

@@ -7,15 +7,13 @@ use crate::inclusion_search::{InclusionSearch, USED_FACE};
 use crate::parameters::{LumpParameters, Parameters};
 use crate::progress::Counter;
 use crate::scan::Scan;
+use crate::starts::DEEPEST;
 use core::ops::ControlFlow;
 use tactile_core::Progress;
 use tactile_elasticity::{ElasticityError, Quantity};
 
 /// Diameters that are solved, relative to the face radius. Smaller ones are treated as the first.
 const DIAMETERS: [f64; 6] = [0.09, 0.15, 0.25, 0.4, 0.65, 1.05];
-
-/// Fraction of the block's height to which an inclusion may extend.
-const DEEPEST: f64 = 0.95;
 
 /// Expected fall of χ² for an inclusion that 95 of 100 searches find. Half of the searches found
 /// balls that lower it by 58, 58 and 78, at three positions with 16 draws of the noise for each of

@@ -52,6 +52,10 @@ const CARRIED_ERROR: f64 = 0.4;
 /// distance on average and 2 % at most.
 const PLACE_ERROR: f64 = 0.015;
 
+/// Largest distance of those solutions, in diameters. Beyond it the error falls with the third power
+/// of the distance, as does the strain beside an inclusion.
+const CLOSE: f64 = 1.5;
+
 /// Fits of two inclusions under one assumption about the face.
 struct Pair {
     lumps: [Hypothesis; 2],
@@ -145,6 +149,7 @@ impl InclusionSearch {
         let both = &best.fits().next()?.parameters;
         let (at, other) = (both.place.centre_m, both.second?.1.centre_m);
         let distance_m = (at[0] - other[0]).hypot(at[1] - other[1]);
+        let fade = (CLOSE / apart(both)).min(1.0).powi(3);
         let rivals = pairs.next().map(|pair| pair.nearer_first(at).lumps);
         let rival = |k: usize| rivals.as_ref().map(|rivals| &rivals[k]);
         let [first, second] = best.lumps;
@@ -152,7 +157,7 @@ impl InclusionSearch {
         let second = second.estimate(observed, rival(1), is_unsolved);
         answer.second = Some(second.inclusion?);
         answer.inclusion?;
-        let error_m = PLACE_ERROR * distance_m;
+        let error_m = PLACE_ERROR * distance_m * fade;
         let both = answer.inclusion.iter_mut().chain(&mut answer.second);
         for at in both.filter_map(|one| one.position_m.as_mut()).flatten() {
             *at = at.widened(error_m);
@@ -276,11 +281,8 @@ impl InclusionSearch {
             .map(|at| [0, 1].map(|k| middle[k] + step * f64::from(at[k])))
             .filter(|at| {
                 let away = |axis: &[f64; 2]| (at[0] - axis[0]).hypot(at[1] - axis[1]);
-                cells
-                    .positions
-                    .axes_m
-                    .iter()
-                    .any(|axis| away(axis) <= cells.reach_m)
+                let mut axes_m = cells.positions.axes_m.iter();
+                axes_m.any(|axis| away(axis) <= cells.reach_m)
             })
             .collect();
         let mut best: Option<(f64, Parameters)> = None;

@@ -219,13 +219,6 @@ impl Parameters {
             (Coordinate::Depth, Some(lump)) => lump.depth_m *= factor,
             (Coordinate::LumpModulus, Some(lump)) => lump.youngs_modulus_pa *= factor,
             (Coordinate::Aspect, Some(lump)) => lump.aspect *= factor,
-            (
-                Coordinate::Diameter
-                | Coordinate::Depth
-                | Coordinate::LumpModulus
-                | Coordinate::Aspect,
-                None,
-            ) => {}
             (Coordinate::Zero, _) => moved.zero_m += step,
             (Coordinate::Height, _) => moved.height_m *= factor,
             (Coordinate::PoissonRatio, _) => {
@@ -245,7 +238,8 @@ impl Parameters {
                 moved.pressed.resize(count, 0.0);
                 moved.pressed[frame] += step;
             }
-            (Coordinate::OfSecond(_), _) => {}
+            // A block without an inclusion has no sizes.
+            _ => {}
         }
         moved
     }

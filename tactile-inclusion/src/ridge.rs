@@ -94,7 +94,7 @@ impl Problem {
     /// The posterior along ln E₁ through an optimum with an inclusion. `None` if it has no
     /// curvature there.
     pub(crate) fn ridge(&self, fit: &Fit, mut go_on: impl FnMut() -> bool) -> Option<Ridge> {
-        let index = (self.coordinates().iter()).position(|c| *c == Coordinate::LumpModulus)?;
+        let index = self.index(Coordinate::LumpModulus)?;
         let (node, start) = self.node(&fit.parameters, fit.normal.clone(), index)?;
         let top = node.density;
         let mut first_bend = DVector::zeros(start.tangent.len());

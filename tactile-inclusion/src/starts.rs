@@ -5,7 +5,7 @@ use crate::parameters::{LumpParameters, Parameters};
 use crate::progress::Counter;
 
 /// Fraction of the block's height to which an inclusion may extend.
-const DEEPEST: f64 = 0.95;
+pub(crate) const DEEPEST: f64 = 0.95;
 
 /// Diameters and depths relative to the face radius, and contrasts E₁/E₀, that a face can detect.
 pub(crate) const DIAMETERS: [f64; 3] = [0.35, 0.65, 1.05];

@@ -337,6 +337,22 @@ fn a_ball_under_the_rim_has_a_place_and_no_size() {
     assert!(inclusion.diameter_m.value().is_none(), "{found:?}");
 }
 
+/// Far aside a deep ball seems too close to the axis.
+#[test]
+fn the_place_of_a_deep_ball_far_aside_is_less_well_known() {
+    let errors = [5e-3, 7.5e-3].map(|aside_m| {
+        let mut parameters = block([aside_m, 0.0]);
+        parameters.place.elongation = [0.0; 2];
+        parameters.lump = Some(lump(12e-3, 6e-3, 30e3));
+        let forward = forward(5).with_plain(&parameters).unwrap();
+        let values = forward.predict(&parameters).unwrap();
+        let found = searched(&values[..2 * positions().len()]);
+        found.inclusion.unwrap().position_m.unwrap()[0].standard_error
+    });
+    // A tenth and a half of a millimetre are errors of the model.
+    assert!(errors[1] > 0.55e-3 && errors[0] < 0.35e-3, "{errors:?}");
+}
+
 #[test]
 fn balls_above_the_detection_limit_are_found_and_those_below_are_not() {
     let (place, contrast, depth_m) = ([5e-3, -2e-3], 2.5, 8e-3);
