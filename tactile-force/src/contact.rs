@@ -490,7 +490,7 @@ impl ContactDetector {
         let mut root = RootOfPixels::default();
         let mut stands_out = |k: usize| {
             let tile = reference.tile_sum(tiles, k);
-            f64::from(sign) * drift.residual(&tile) > z * root.of(&tile)
+            f64::from(sign) * drift.residual(&tile) > z * root.of(tile.pixels)
         };
         // The last tile of a band is the smallest. If all sums of a band are below the noise of
         // that tile, the band has no bright tile.

@@ -3,6 +3,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use tactile_core::vectorised;
+
 use crate::tiles::{TILE_COLUMNS, TILE_ROWS, TileSum};
 
 /// A third of a normal variable's absolute values is below this number of standard deviations.
@@ -241,23 +243,20 @@ impl IlluminationDrift {
     }
 
     /// The automatic correction if its error is small enough; otherwise none, with the reason.
-    fn accepted(self, tiles: &[TileSum], sd: f64) -> Self {
-        // A face that covers most of the frame is also uniform, but it does not reach the border.
-        let [right, bottom] = self.middle.map(|half| 2.0 * half);
-        let (wide, high) = (TILE_COLUMNS as f64, TILE_ROWS as f64);
-        let at_border = |tile: &TileSum| {
-            tile.x < wide || tile.y < high || tile.x > right - wide || tile.y > bottom - high
-        };
+    /// `residuals` are those of the tiles per pixel.
+    fn accepted(self, levels: &Levels, residuals: &[f64], sd: f64) -> Self {
         let (mut agree, mut all) = ([0.0; 2], [0.0; 2]);
         let mut root = RootOfPixels::default();
-        for tile in tiles {
+        let tiles = levels.own.iter().zip(&levels.pixels).zip(&levels.at_border);
+        for (((own, &pixels), &at_border), residual) in tiles.zip(residuals) {
             // A tile agrees if its drift deviates by at most a hundredth of the background.
-            let limit = 3.0 * sd * root.of(tile) + 0.01 * tile.reference;
-            let agrees = f64::from(self.residual(tile).abs() <= limit);
-            for k in 0..1 + usize::from(at_border(tile)) {
-                agree[k] += agrees;
-                all[k] += 1.0;
-            }
+            let limit = 3.0 * sd * root.of(pixels) + 0.01 * own * pixels;
+            let agrees = f64::from(u8::from(residual * pixels <= limit));
+            let at_border = f64::from(u8::from(at_border));
+            agree[0] += agrees;
+            agree[1] += agrees * at_border;
+            all[0] += 1.0;
+            all[1] += at_border;
         }
         let [whole, border] = [0, 1].map(|k| agree[k] / f64::max(all[k], 1.0));
         let share = f64::min(whole, border);
@@ -289,14 +288,14 @@ impl IlluminationDrift {
     /// a limit. `sd` is the noise of one pixel. Returns the number of tiles.
     ///
     /// Positions are relative to the centre of the frame, in units of half the frame.
-    fn step(&mut self, tiles: &[TileSum], limit: f64, sd: f64) -> usize {
+    fn step(&mut self, tiles: impl Iterator<Item = TileSum>, limit: f64, sd: f64) -> usize {
         // Slopes per half frame give the three columns similar sizes, and the matrix a good
         // condition number.
         let scale = [1.0, self.middle[0].max(1.0), self.middle[1].max(1.0)];
         let (mut matrix, mut right) = (Matrix3::<f64>::zeros(), Vector3::<f64>::zeros());
         let (mut count, mut reference, mut pixels) = (0, 0.0, 0.0);
         for tile in tiles {
-            let residual = self.residual(tile);
+            let residual = self.residual(&tile);
             let is_near = (residual / tile.pixels).abs() <= limit;
             if !is_near {
                 continue;
@@ -305,7 +304,7 @@ impl IlluminationDrift {
                 1.0,
                 (tile.x - self.middle[0]) / scale[1],
                 (tile.y - self.middle[1]) / scale[2],
-            ) * weight(tile);
+            ) * weight(&tile);
             // The variance of a tile's sum is proportional to its number of pixels.
             let by = slopes / tile.pixels;
             right += by * residual;
@@ -329,39 +328,12 @@ impl IlluminationDrift {
         count
     }
 
-    /// Fits illumination and stray light to the tiles whose residual level per pixel is within a
-    /// limit. A line through their changes over the reference reveals which of them changed;
-    /// otherwise the change is attributed to the illumination. `sd` is the noise of a pixel, and
-    /// `scatter` the ratio of the tiles' scatter to the noise of a tile. Returns the number of tiles.
-    fn step_both(&mut self, tiles: &Levels<'_>, limit: f64, sd: f64, scatter: f64) -> usize {
-        let (mut count, mut pixels, mut sums) = (0, 0.0, [0.0; 8]);
-        // The preceding tile stands for the structure of the reference: the change of a tile
-        // contains the noise of its own reference level, which would cause a spurious slope.
-        let mut before = None;
-        let levels = tiles.tiles.iter().zip(tiles.of_pixels).zip(tiles.residuals);
-        for ((tile, &[own, change]), residual) in levels {
-            let is_near = *residual <= limit;
-            if !is_near {
-                continue;
-            }
-            let other = before.replace(own).unwrap_or(own);
-            let products = [
-                own,
-                change,
-                other,
-                other * other,
-                other * own,
-                other * change,
-                own * own,
-                own * change,
-            ];
-            for (sum, product) in sums.iter_mut().zip(products) {
-                *sum += tile.pixels * product;
-            }
-            pixels += tile.pixels;
-            count += 1;
-        }
-        let pixels = f64::max(pixels, 1.0);
+    /// Sets illumination and stray light by the sums over the tiles of the background. A line through
+    /// their changes over the reference reveals which of them changed; otherwise the change is
+    /// attributed to the illumination. `sd` is the noise of a pixel, and `scatter` the ratio of the
+    /// tiles' scatter to the noise of a tile.
+    fn set_both(&mut self, of: &BackgroundSums, sd: f64, scatter: f64) {
+        let pixels = f64::max(of.pixels, 1.0);
         let [
             reference,
             change,
@@ -371,7 +343,7 @@ impl IlluminationDrift {
             with_change,
             own,
             moved,
-        ] = sums.map(|sum| sum / pixels);
+        ] = of.sums.map(|sum| sum / pixels);
         let covariances = [with_own - other * reference, with_change - other * change];
         let variance = (square - other * other).max(f64::MIN_POSITIVE);
         let level_error = (sd / pixels.sqrt()).max(1e-6);
@@ -401,17 +373,92 @@ impl IlluminationDrift {
         self.reference = reference;
         self.standard_error = error;
         self.covariance[0][0] = self.standard_error.powi(2);
-        count
     }
 }
 
-/// Tiles with quantities per pixel.
-struct Levels<'a> {
-    tiles: &'a [TileSum],
-    /// Derivative by the illumination, and change.
-    of_pixels: &'a [[f64; 2]],
-    /// Absolute residuals.
-    residuals: &'a [f64],
+/// Quantities of tiles per pixel, by column.
+#[derive(Clone, Debug, Default)]
+struct Levels {
+    /// Numbers of pixels.
+    pixels: Vec<f64>,
+    /// Derivatives by the illumination.
+    own: Vec<f64>,
+    changes: Vec<f64>,
+    /// Whether tiles are at the border of the frame. A face that covers most of the frame is also
+    /// uniform, but it does not reach the border.
+    at_border: Vec<bool>,
+}
+
+impl Levels {
+    /// Takes the tiles of a frame with this middle.
+    fn fill(&mut self, tiles: impl Iterator<Item = TileSum> + Clone, middle: [f64; 2]) {
+        let reach = [
+            middle[0] - TILE_COLUMNS as f64,
+            middle[1] - TILE_ROWS as f64,
+        ];
+        let at_border = |tile: &TileSum| {
+            (tile.x - middle[0]).abs() > reach[0] || (tile.y - middle[1]).abs() > reach[1]
+        };
+        self.at_border.clear();
+        self.at_border
+            .extend(tiles.clone().map(|tile| at_border(&tile)));
+        self.pixels.clear();
+        self.pixels.extend(tiles.clone().map(|tile| tile.pixels));
+        self.own.clear();
+        self.own
+            .extend(tiles.clone().map(|tile| weight(&tile) / tile.pixels));
+        self.changes.clear();
+        self.changes
+            .extend(tiles.map(|tile| tile.difference / tile.pixels));
+    }
+
+    /// Absolute residuals of a change of the light of the whole frame.
+    #[inline(always)]
+    fn residuals(&self, drift: &IlluminationDrift, residuals: &mut Vec<f64>) {
+        let (gain, stray) = (drift.coefficients[0] - 1.0, drift.stray_grey);
+        residuals.clear();
+        let levels = self.own.iter().zip(&self.changes);
+        residuals.extend(levels.map(|(own, change)| (change - own * gain - stray).abs()));
+    }
+}
+
+/// Sums over the tiles whose residual is within a limit.
+struct BackgroundSums {
+    tiles: usize,
+    pixels: f64,
+    /// Sums over the pixels, see [`BackgroundSums::over`].
+    sums: [f64; 8],
+}
+
+impl BackgroundSums {
+    /// Sums of own level o, change c and preceding level p: o, c, p, p², p o, p c, o² and o c.
+    ///
+    /// The preceding tile stands for the structure of the reference: the change of a tile contains
+    /// the noise of its own reference level, which would cause a spurious slope.
+    #[inline(always)]
+    fn over(levels: &Levels, residuals: &[f64], limit: f64) -> Self {
+        let (mut tiles, mut pixels, mut sums) = (0, 0.0, [0.0; 8]);
+        let mut before = None;
+        let rows = levels.own.iter().zip(&levels.changes).zip(&levels.pixels);
+        for (((&own, &change), &count), residual) in rows.zip(residuals) {
+            if *residual > limit {
+                continue;
+            }
+            let other = before.replace(own).unwrap_or(own);
+            let left = [own, change, other, other, other, other, own, own];
+            let right = [1.0, 1.0, 1.0, other, own, change, own, change];
+            for k in 0..8 {
+                sums[k] += count * (left[k] * right[k]);
+            }
+            pixels += count;
+            tiles += 1;
+        }
+        Self {
+            tiles,
+            pixels,
+            sums,
+        }
+    }
 }
 
 /// Square root of the number of a tile's pixels, which nearly all tiles have in common.
@@ -423,9 +470,9 @@ pub(crate) struct RootOfPixels {
 
 impl RootOfPixels {
     #[inline(always)]
-    pub(crate) fn of(&mut self, tile: &TileSum) -> f64 {
-        if tile.pixels != self.pixels {
-            (self.pixels, self.root) = (tile.pixels, tile.pixels.sqrt());
+    pub(crate) fn of(&mut self, pixels: f64) -> f64 {
+        if pixels != self.pixels {
+            (self.pixels, self.root) = (pixels, pixels.sqrt());
         }
         self.root
     }
@@ -439,11 +486,9 @@ fn weight(tile: &TileSum) -> f64 {
 /// Buffers of the fit.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FitWorkspace {
-    pub(crate) tiles: Vec<TileSum>,
-    /// Derivative by the illumination, and change, per pixel.
-    of_pixels: Vec<[f64; 2]>,
-    pub(crate) values: Vec<f64>,
-    pub(crate) scratch: Vec<f64>,
+    levels: Levels,
+    values: Vec<f64>,
+    scratch: Vec<f64>,
 }
 
 /// Fits the correction by least squares to all tiles except outliers (the contact), repeated until
@@ -452,57 +497,62 @@ pub(crate) struct FitWorkspace {
 pub(crate) fn fit(
     correction: DriftCorrection,
     (rows, columns): (usize, usize),
-    given: impl Iterator<Item = TileSum>,
+    tiles: impl Iterator<Item = TileSum> + Clone,
     sd: f64,
     sign: f64,
     workspace: &mut FitWorkspace,
 ) -> IlluminationDrift {
     let FitWorkspace {
-        tiles,
-        of_pixels,
+        levels,
         values,
         scratch,
     } = workspace;
-    tiles.clear();
-    tiles.extend(given);
     let mut drift = IlluminationDrift {
         correction,
         middle: [0.5 * (columns as f64 - 1.0), 0.5 * (rows as f64 - 1.0)],
         ..IlluminationDrift::default()
     };
+    levels.fill(tiles.clone(), drift.middle);
     let automatic = correction == DriftCorrection::Automatic;
-    of_pixels.clear();
-    if automatic {
-        let per_pixel = |tile: &TileSum| [weight(tile), tile.difference].map(|v| v / tile.pixels);
-        of_pixels.extend(tiles.iter().map(per_pixel));
-    }
-    values.clear();
-    values.extend(tiles.iter().map(|tile| drift.residual(tile) / weight(tile)));
     // A contact changes tiles to one side. The third on the other side is background even if a
     // contact covers more than half of a small frame.
-    values.iter_mut().for_each(|value| *value *= sign);
+    let changes = levels.changes.iter().zip(&levels.own);
+    values.clear();
+    values.extend(changes.map(|(change, own)| sign * (change / own)));
     drift.coefficients[0] += sign * quantile(values, 3, scratch);
     let noise = sd / ((TILE_ROWS * TILE_COLUMNS) as f64).sqrt();
     let mut seen = [[f64::NAN; 4]; MOST_STEPS];
     let (mut steps, mut end) = (0, MOST_STEPS);
+    let mut background: Option<BackgroundSums> = None;
     while steps < end {
-        values.clear();
-        let level = |tile: &TileSum| (drift.residual(tile) / tile.pixels).abs();
-        values.extend(tiles.iter().map(level));
+        if automatic {
+            vectorised(
+                #[inline(always)]
+                || levels.residuals(&drift, values),
+            );
+        } else {
+            let level = |tile: &TileSum| (drift.residual(tile) / tile.pixels).abs();
+            values.clear();
+            values.extend(tiles.clone().map(|tile| level(&tile)));
+        }
         // Scatter of the third that is nearest, which tiles of the contact hardly widen, but at least
         // the noise.
         let limit = 3.0 * (quantile(values, 3, scratch) / THIRD).max(noise);
         let before = drift.tiles;
-        drift.tiles = match automatic {
-            true => {
-                let levels = Levels {
-                    tiles,
-                    of_pixels,
-                    residuals: values,
-                };
-                drift.step_both(&levels, limit, sd, limit / (3.0 * noise))
-            }
-            false => drift.step(tiles, limit, sd),
+        drift.tiles = if automatic {
+            let near = values.iter().filter(|residual| **residual <= limit).count();
+            let of = match background.take() {
+                // Nearly always the same tiles.
+                Some(of) if of.tiles == near => of,
+                _ => vectorised(
+                    #[inline(always)]
+                    || BackgroundSums::over(levels, values, limit),
+                ),
+            };
+            drift.set_both(&of, sd, limit / (3.0 * noise));
+            background.insert(of).tiles
+        } else {
+            drift.step(tiles.clone(), limit, sd)
         };
         // An equal number of tiles nearly always means the same tiles, so the fit has converged.
         if drift.tiles == before {
@@ -521,7 +571,8 @@ pub(crate) fn fit(
         steps += 1;
     }
     if automatic {
-        return drift.accepted(tiles, sd);
+        levels.residuals(&drift, values);
+        return drift.accepted(levels, values, sd);
     }
     drift.outcome = DriftOutcome::Corrected;
     drift

@@ -365,7 +365,9 @@ impl ReferenceFrame {
         if frame.dim() != reference.dim() {
             return None;
         }
-        let mut counts = [0_usize; 511];
+        // Two histograms in turn: most pixels change by the same amount, and a count that was just
+        // written is not yet ready to be read.
+        let mut counts = [[0_usize; 511]; 2];
         let mut total = 0;
         // Steps between the means of the rows show noise that the pixels of a row share.
         let (mut previous, mut steps, mut squares) = (None, 0.0, 0.0);
@@ -384,8 +386,8 @@ impl ReferenceFrame {
                     let row = image.index_axis_move(Axis(0), row);
                     row.slice_axis_move(Axis(0), Slice::from(span.clone()))
                 });
-                for (&f, &r) in frame.iter().zip(reference) {
-                    counts[usize::from(255 + u16::from(f) - u16::from(r))] += 1;
+                for (k, (&f, &r)) in frame.iter().zip(reference).enumerate() {
+                    counts[k % 2][usize::from(255 + u16::from(f) - u16::from(r))] += 1;
                     sum += i64::from(f) - i64::from(r);
                 }
             }
@@ -401,6 +403,11 @@ impl ReferenceFrame {
         if total < 100 {
             return None;
         }
+        let [mut counts, odd] = counts;
+        counts
+            .iter_mut()
+            .zip(odd)
+            .for_each(|(sum, odd)| *sum += odd);
         let quantile = |share: f64| {
             let wanted = share * total as f64;
             let mut below = 0.0;
