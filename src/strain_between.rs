@@ -2,7 +2,9 @@
 use crate::elasticity::ElasticityError;
 use crate::elasticity::field::{StrainField, StrainSummary};
 use crate::elasticity::strain::{Deformation, GreenLagrange, StrainMeasure};
-use crate::matching::{AnnealedSoftassign, Doubt, MatchError, Matching, PointMatcher, StopReason};
+use crate::matching::{
+    AnnealedSoftassign, Doubt, LatticeStep, MatchError, Matching, PointMatcher, StopReason,
+};
 use crate::tps::{LocalField, LocalValue, TpsError, nearest_rows};
 use nalgebra::{Matrix3, Point, SMatrix, SVector};
 use std::ops::ControlFlow;
@@ -263,6 +265,10 @@ pub struct StrainBetween<const D: usize> {
     pub unresolved: usize,
     /// Why the pairs may be wrong. `None` if no check raised a doubt.
     pub doubt: Option<PairsDoubt>,
+    /// A lattice step by which the pairs can be shifted, see
+    /// [`MatchReport::period`](crate::matching::MatchReport::period): the smallest
+    /// motion is assumed. `None` for pairs that were given.
+    pub period: Option<LatticeStep>,
     pub(crate) field: LocalField<D>,
     /// The field at each matched point.
     pub(crate) values: Vec<LocalValue<D>>,
@@ -339,6 +345,7 @@ impl<const D: usize> StrainBetween<D> {
         let possible = before.len().min(after.len());
         let mut found = Self::of_share(before, after, &pairs, options.work(), possible)?;
         found.doubt = doubt.or(found.doubt);
+        found.period = matching.report.period;
         options.allow(found)
     }
 
@@ -460,6 +467,7 @@ impl<const D: usize> StrainBetween<D> {
         let share = kept / possible as f64;
         Ok(Self {
             doubt: doubt(share, miss / spacing).or(shape_doubt(&sources, &strained)),
+            period: None,
             pairs: rows.iter().map(|&(i, j)| [before[i], after[j]]).collect(),
             displacements: values.iter().map(|value| value.displacement).collect(),
             rows,

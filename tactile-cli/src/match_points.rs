@@ -14,9 +14,9 @@ use tactile_files::io::{
 };
 use tactile_imaging::PairsDoubt;
 use tactile_imaging::matching::{
-    AnnealedSoftassign, CoherentPointDrift, FittedTransformation, Judgement, LinearAssignment,
-    NearestNeighbour, Outliers, PointMatcher, RelaxationLabelling, Rotation, StopReason,
-    Transformation,
+    AnnealedSoftassign, CoherentPointDrift, FittedTransformation, Judgement, LatticeStep,
+    LinearAssignment, NearestNeighbour, Outliers, PointMatcher, RelaxationLabelling, Rotation,
+    StopReason, Transformation,
 };
 
 /// Match the points of two sets, in the plane or in space
@@ -295,6 +295,9 @@ fn solve<const D: usize>(
     if let Some(report) = &mut context.outputs.report {
         report.row(&name, &found);
     }
+    if let Some(step) = report.period {
+        context.aside(format_args!("{name}: {}", smallest_motion(step)));
+    }
     let doubt = report
         .doubt()
         .map(|doubt| PairsDoubt::Matcher(doubt).to_string());
@@ -320,13 +323,18 @@ fn solve<const D: usize>(
         "assignment": matching.assignment, "confidence": matching.confidence,
         "unmatched_share": 1.0 - matched as f64 / points as f64,
         "residual": report.residual, "noise": report.sigma, "stop": stop, "doubt": doubt,
-        "judged": report.judgement != Judgement::NotJudged,
+        "period": report.period.map(|step| step.0), "judged": report.judgement != Judgement::NotJudged,
         "iterations": iterations, "starts": starts, "time_ms": ms,
     });
     if let Some(transformation) = transformation {
         value["transformation"] = transformation;
     }
     Some(json!({ "case": case, "match": value }))
+}
+
+/// What a match of two sets that repeat assumes.
+pub(crate) fn smallest_motion(step: LatticeStep) -> String {
+    format!("{step}: assumed is the smallest motion (--largest-motion bounds it)")
 }
 
 /// Rotation, scale and shift of a map with their standard errors, in words.

@@ -439,6 +439,9 @@ impl<const D: usize> StrainReport<D> {
             "noise",
             format_args!("{noise} for each coordinate (in {})", self.unit),
         );
+        if let Some(step) = found.period {
+            context.row("assumed", match_points::smallest_motion(step));
+        }
         if found.unresolved > 0 {
             let text = format!(
                 "the noise about {} points is far above that elsewhere: the points do not resolve \
@@ -482,6 +485,7 @@ impl<const D: usize> StrainReport<D> {
                 "degrees_of_freedom": found.degrees_of_freedom,
                 "folded_points": found.summary.folded,
                 "doubt": found.doubt.map(|doubt| doubt.to_string()),
+                "period": found.period.map(|step| step.0),
                 "components": components_json(found),
             }),
             Err(reason) => json!({ "error": reason }),

@@ -49,11 +49,10 @@ pub enum Doubt {
     Symmetric,
     /// The points form a lattice that may continue outside the view. Shifted by one lattice step,
     /// they fit the targets equally well with a motion that is not much larger. To exclude it, set
-    /// the largest motion
-    /// motion ([`AnnealedSoftassign::with_largest_motion`](crate::AnnealedSoftassign)).
+    /// the largest motion ([`AnnealedSoftassign::with_largest_motion`](crate::AnnealedSoftassign)).
     Repeats {
-        /// The lattice step in the units of the points. In the plane the last component is zero.
-        step: [f64; 3],
+        /// The lattice step.
+        step: LatticeStep,
     },
     /// The model rotated by a large angle fits the targets better, but such rotations are excluded.
     Turned,
@@ -65,7 +64,13 @@ pub enum Doubt {
 impl std::fmt::Display for Doubt {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
-            Self::Repeats { step } => return write_repeats(f, step),
+            Self::Repeats { step } => {
+                return write!(
+                    f,
+                    "{step}: motions beyond {:.4} are ambiguous unless a largest motion is set",
+                    0.5 * step.length()
+                );
+            }
             Self::FewPairs => "so few points match that the pairs may be chance coincidences",
             Self::LargeResiduals => {
                 "the residuals of the match are as large as those of scattered points"
@@ -122,22 +127,43 @@ pub enum Judgement {
     Doubtful(Doubt),
 }
 
-/// Writes the step of a lattice, by axis if it is within three degrees of one.
-fn write_repeats(f: &mut std::fmt::Formatter<'_>, step: &[f64; 3]) -> std::fmt::Result {
-    let length = step.iter().map(|s| s * s).sum::<f64>().sqrt();
-    let [x, y, z] = step.map(|s| s / length);
-    let axes = ["x", "y", "z"].into_iter().zip([x, y, z]);
-    let along = match axes.into_iter().find(|(_, c)| c.abs() > 0.9986) {
-        Some((axis, _)) => axis.to_owned(),
-        None if z == 0.0 => format!("({x:.2}, {y:.2})"),
-        None => format!("({x:.2}, {y:.2}, {z:.2})"),
-    };
-    write!(
-        f,
-        "the points repeat every {length:.4} along {along}: motions beyond {:.4} are ambiguous \
-         unless a largest motion is set",
-        0.5 * length
-    )
+/// A step that maps a set of points onto itself, edges apart, in the units of the points. In the
+/// plane the last component is zero.
+///
+/// ```
+/// use tactile_match::LatticeStep;
+/// let step = LatticeStep([0.0, 12.5, 0.0]);
+/// assert_eq!(step.to_string(), "the points repeat every 12.5000 along y");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(transparent)
+)]
+pub struct LatticeStep(pub [f64; 3]);
+
+impl LatticeStep {
+    /// Length of the step.
+    #[must_use]
+    pub fn length(&self) -> f64 {
+        self.0.iter().map(|s| s * s).sum::<f64>().sqrt()
+    }
+}
+
+/// Names an axis if the step is within three degrees of it.
+impl std::fmt::Display for LatticeStep {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let length = self.length();
+        let [x, y, z] = self.0.map(|s| s / length);
+        let axes = ["x", "y", "z"].into_iter().zip([x, y, z]);
+        let along = match axes.into_iter().find(|(_, c)| c.abs() > 0.9986) {
+            Some((axis, _)) => axis.to_owned(),
+            None if z == 0.0 => format!("({x:.2}, {y:.2})"),
+            None => format!("({x:.2}, {y:.2}, {z:.2})"),
+        };
+        write!(f, "the points repeat every {length:.4} along {along}")
+    }
 }
 
 // Judges pairs by whether neighbours move together.
@@ -303,7 +329,8 @@ fn repeats<const D: usize>(
         .find(repeated)?;
     let mut outward = [0.0; 3];
     (0..D).for_each(|k| outward[k] = step[k]);
-    Some(Doubt::Repeats { step: outward })
+    let step = LatticeStep(outward);
+    Some(Doubt::Repeats { step })
 }
 
 /// Median of the sum of `dimension` squared standard normal deviates, by the approximation of

@@ -56,7 +56,7 @@ pub use assignment::linear_assignment;
 pub use cpd::{CoherentPointDrift, Normalization};
 pub use error::MatchError;
 pub use hard::{LinearAssignment, NearestNeighbour};
-pub use judgement::{Doubt, Judgement};
+pub use judgement::{Doubt, Judgement, LatticeStep};
 pub use labelling::RelaxationLabelling;
 pub use matching::{MatchReport, MatchedPairs, Matching, PointMatcher, SoftMatches, WarmStart};
 pub use nalgebra;

@@ -2,7 +2,7 @@
 
 use crate::error::{option_within, point_sets};
 use crate::interpolation::fitted;
-use crate::{Doubt, FittedTransformation, Judgement, MatchError};
+use crate::{Doubt, FittedTransformation, Judgement, LatticeStep, MatchError};
 use nalgebra::{Point, SMatrix};
 use std::ops::{ControlFlow, Deref};
 use tactile_core::StopReason;
@@ -244,6 +244,26 @@ pub struct MatchReport {
     /// Whether the pairs are reliable.
     #[cfg_attr(feature = "serde", serde(default))]
     pub judgement: Judgement,
+    /// A step of a lattice that both sets may continue outside the view: shifted by it, the answer
+    /// fits the targets equally well. The smallest motion is assumed. If the shifted one is
+    /// likely as well, the doubt is [`Doubt::Repeats`].
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_match::{AnnealedSoftassign, PointMatcher};
+    /// let grid: Vec<_> = (0..63)
+    ///     .map(|k| Point2::new(f64::from(k % 9), f64::from(k / 9)))
+    ///     .collect();
+    /// // Or by 0.95 the other way: no one can tell.
+    /// let moved: Vec<_> = grid.iter().map(|p| Point2::new(p.x + 0.05, p.y)).collect();
+    /// let report = AnnealedSoftassign::default().match_points(&grid, &moved)?.report;
+    /// assert_eq!(report.doubt(), None);
+    /// let period = report.period.expect("a lattice");
+    /// assert!((period.length() - 1.0).abs() < 1e-6);
+    /// # Ok::<(), tactile_match::MatchError>(())
+    /// ```
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub period: Option<LatticeStep>,
 }
 
 impl MatchReport {

@@ -282,6 +282,7 @@ pub(crate) fn answer<const D: usize>(
         confidence: arrays::kept_vector(py, found.confidence.clone()),
         pairs: arrays::kept(py, rows_of_pairs(&pairs)),
         sigma: report.sigma,
+        period: report.period.map(|step| step.0[..D].to_vec()),
         iterations: report.iterations,
         rotation: map.map(|map| map.rotation.as_slice().to_vec()),
         rotation_error: map.map(|map| map.rotation_error.as_slice().to_vec()),
@@ -670,6 +671,7 @@ fn result<const D: usize>(
         size_ratios: with_error(|at| [at.size_ratio, at.size_ratio_error]),
         von_mises: with_error(|at| [at.equivalent, at.equivalent_error]),
         sigma: found.sigma,
+        period: found.period.map(|step| step.0[..D].to_vec()),
         flags: found.doubt.iter().map(ToString::to_string).collect(),
         grid,
     })

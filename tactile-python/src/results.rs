@@ -440,6 +440,9 @@ result! {
         von_mises: Matrix<f64>,
         /// Noise of one coordinate in the unit of the points.
         sigma: f64,
+        /// Step of a lattice by which the pairs can be shifted with an equal fit: the smallest motion is
+        /// assumed. `None` for points that do not repeat.
+        period: Option<Vec<f64>>,
         /// Reasons why the pairs are unreliable, one sentence each.
         flags: Vec<String>,
         /// Displacement and strain on the grid, if one was requested.
@@ -508,6 +511,9 @@ result! {
         pairs: Matrix<i64>,
         /// Noise of one coordinate in the unit of the points.
         sigma: f64,
+        /// Step of a lattice by which the pairs can be shifted with an equal fit: the smallest motion is
+        /// assumed. `None` for points that do not repeat.
+        period: Option<Vec<f64>>,
         /// Number of iterations.
         iterations: usize,
         /// For a matcher with a `transformation`: the rotation vector in radians (in the plane its last

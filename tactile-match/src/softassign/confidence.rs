@@ -53,7 +53,7 @@ impl<const D: usize> Answer<D> {
         let gain = problem.gain(best).unwrap_or(f64::INFINITY);
         let symmetric = outcome.symmetric.then_some(Doubt::Symmetric);
         let own = self.doubt(problem, gain, best);
-        let doubt = outcome.rival.or(own).or(symmetric);
+        let doubt = outcome.rivals.doubt.or(own).or(symmetric);
         if let Some(doubt) = doubt {
             self.lower_confidences(doubt, gain);
         }
@@ -71,6 +71,7 @@ impl<const D: usize> Answer<D> {
             residual: residual * problem.frame.scale,
             sigma: runner.fine.sigma.unwrap_or(best.sigma) * problem.frame.scale,
             judgement: doubt.map_or(Judgement::Sure, Judgement::Doubtful),
+            period: outcome.rivals.period,
         };
     }
 

@@ -3,11 +3,10 @@
 use super::levels::STEP;
 use super::patterns::MAX_PATTERN_REACH;
 use super::problem::Problem;
-use super::race::{Race, Runner};
+use super::race::{Race, Rivals, Runner};
 use super::run::{Cooling, SCALES, Schedule};
 use super::starts::FAST;
 use super::{Mechanism, Rotation, squared_distance, starts};
-use crate::Doubt;
 use std::ops::ControlFlow;
 
 // Large sets are matched from coarse to fine.
@@ -36,8 +35,8 @@ const SEEDED: f64 = 0.4;
 
 impl<const D: usize> Race<'_, D> {
     /// Matches the samples in turn, each from the result of the coarser one, unless the motions of
-    /// blocks lead to a likely answer. Returns a rival of the answer.
-    pub(super) fn coarse_to_fine(&mut self) -> ControlFlow<(), Option<Doubt>> {
+    /// blocks lead to a likely answer. Returns the rivals of the answer.
+    pub(super) fn coarse_to_fine(&mut self) -> ControlFlow<(), Rivals> {
         let problem = self.problem;
         let smaller = problem.smaller();
         let levels = &mut self.runner.levels;

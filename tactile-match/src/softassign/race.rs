@@ -13,7 +13,7 @@ use super::scales::ScaleAverage;
 use super::starts::{MOVED, REHEAT, SLOW, Start};
 use super::tuples::Tuples;
 use super::{Mechanism, Rotation, Search, starts};
-use crate::{Doubt, Watch};
+use crate::{Doubt, LatticeStep, Watch};
 use nalgebra::SVector;
 use std::ops::ControlFlow;
 
@@ -75,6 +75,14 @@ impl<const D: usize> Annealer<D> {
     }
 }
 
+/// Other answers that fit as well, or better but are excluded by the options.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Rivals {
+    pub doubt: Option<Doubt>,
+    /// A lattice step by which the answer can be shifted, whatever the motion.
+    pub period: Option<LatticeStep>,
+}
+
 /// What a search has found, beside its best run.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Outcome {
@@ -82,8 +90,7 @@ pub(super) struct Outcome {
     pub starts: usize,
     /// Whether the caller stopped it.
     pub stopped: bool,
-    /// Another answer that fits as well, or better but is excluded by the options.
-    pub rival: Option<Doubt>,
+    pub rivals: Rivals,
     /// Whether all rotations are allowed and one maps the model onto itself.
     pub symmetric: bool,
 }

@@ -1,10 +1,10 @@
 //! Rivals of an answer: the model rotated, mirrored or shifted by a step of its lattice.
 
-use super::race::{Race, Runner};
+use super::race::{Race, Rivals, Runner};
 use super::run::Cooling;
 use super::starts::FAST;
 use super::{Mechanism, Rotation, difference, mean, squared, starts};
-use crate::Doubt;
+use crate::{Doubt, LatticeStep};
 use nalgebra::{SMatrix, SVector};
 use std::ops::ControlFlow;
 
@@ -74,17 +74,21 @@ fn mirror<const D: usize>() -> SMatrix<f64, D, D> {
 impl<const D: usize> Race<'_, D> {
     /// Searches for a better answer among the rotated, mirrored and shifted models. An allowed
     /// rival replaces the best run. Returns another that is better or equally good.
-    pub(super) fn look_for_rivals(&mut self) -> ControlFlow<(), Option<Doubt>> {
+    pub(super) fn look_for_rivals(&mut self) -> ControlFlow<(), Rivals> {
         let few = self.problem.smaller() < 4 * D;
         if few || self.best.trace.is_empty() || !self.has(Mechanism::Rivals) {
-            return ControlFlow::Continue(None); // any few points have many nearly equal partners
+            // Any few points have many nearly equal partners.
+            return ControlFlow::Continue(Rivals::default());
         }
         let spacing = self.problem.model_spacing();
         self.put_where_looked_up(spacing);
         if self.best.sigma >= RESOLVED * spacing {
             let twin = self.look_for_turns(spacing)?;
             if twin.is_some() {
-                return ControlFlow::Continue(twin);
+                return ControlFlow::Continue(Rivals {
+                    doubt: twin,
+                    period: None,
+                });
             }
         }
         self.look_for_steps(spacing)
@@ -136,8 +140,8 @@ impl<const D: usize> Race<'_, D> {
     }
 
     /// Searches for lattice steps: the answer of least motion replaces one that fits the targets no
-    /// better. Returns a step that fits equally well and is within reach.
-    fn look_for_steps(&mut self, spacing: f64) -> ControlFlow<(), Option<Doubt>> {
+    /// better. Returns a step that fits equally well, and a doubt if it is within reach.
+    fn look_for_steps(&mut self, spacing: f64) -> ControlFlow<(), Rivals> {
         let problem = self.problem;
         self.find_steps(spacing);
         // Each round shifts the answer by one step towards the unmoved model.
@@ -173,14 +177,18 @@ impl<const D: usize> Race<'_, D> {
                 }
             }
             let step = linear * moved.step;
-            if motion < REACH * own && motion <= problem.farthest && !self.is_whole(&step) {
+            if motion <= problem.farthest && !self.is_whole(&step) {
                 let mut outward = [0.0; 3];
                 (0..D).for_each(|k| outward[k] = step[k] * problem.frame.scale);
-                return ControlFlow::Continue(Some(Doubt::Repeats { step: outward }));
+                let step = LatticeStep(outward);
+                return ControlFlow::Continue(Rivals {
+                    doubt: (motion < REACH * own).then_some(Doubt::Repeats { step }),
+                    period: Some(step),
+                });
             }
             break;
         }
-        ControlFlow::Continue(None)
+        ControlFlow::Continue(Rivals::default())
     }
 
     /// Anneals the current run. Returns its gain over the best one.

@@ -6,11 +6,10 @@
 //! averaged.
 
 use super::problem::{MIN_TELLING_GAIN, are_unequal};
-use super::race::{Outcome, Race, Runner};
+use super::race::{Outcome, Race, Rivals, Runner};
 use super::run::{Cooling, Run, SCALES};
 use super::starts::{FAST, MOVED, NEAR, OPEN, Start, further_starts};
 use super::{Mechanism, Rotation, Search};
-use crate::Doubt;
 use std::ops::ControlFlow;
 
 /// If soft partners spread more than this, relative to the temperature, the evidence of a warp is
@@ -18,25 +17,23 @@ use std::ops::ControlFlow;
 const MOST_SPREAD: f64 = 0.3;
 
 impl<const D: usize> Race<'_, D> {
-    /// Searches for the best run, which stays in `best`. Returns a rival of it.
-    pub(super) fn go(&mut self) -> ControlFlow<(), Option<Doubt>> {
+    /// Searches for the best run, which stays in `best`. Returns its rivals.
+    pub(super) fn go(&mut self) -> ControlFlow<(), Rivals> {
         if self.problem.is_large() {
             return self.coarse_to_fine();
         }
         self.runner.prepare(self.problem);
         match self.problem.options.search {
-            Search::Near => self.run(Start::Centred, NEAR).map_continue(|()| None),
+            Search::Near => self
+                .run(Start::Centred, NEAR)
+                .map_continue(|()| Rivals::default()),
             Search::Thorough => self.search(),
         }
     }
 
     /// One short run from `start`. Its first temperature is `sigma`, limited to the range between
     /// the lowest at which points still change partners and that of sets near each other.
-    pub(super) fn go_from(
-        &mut self,
-        start: &[[f64; D]],
-        sigma: f64,
-    ) -> ControlFlow<(), Option<Doubt>> {
+    pub(super) fn go_from(&mut self, start: &[[f64; D]], sigma: f64) -> ControlFlow<(), Rivals> {
         self.runner.prepare(self.problem);
         let run = &mut self.runner.run;
         run.base.clone_from(&self.problem.model);
@@ -44,13 +41,13 @@ impl<const D: usize> Race<'_, D> {
         run.warped.extend_from_slice(start);
         let sigma = sigma.clamp(0.03, NEAR.sigma);
         self.anneal(Cooling { sigma, ..NEAR })
-            .map_continue(|()| None)
+            .map_continue(|()| Rivals::default())
     }
 
     /// Prepares the reading of the answer: soft matches and regression become those of the best run.
-    /// `rival` is `None` if the search was stopped.
-    pub(super) fn outcome(mut self, rival: Option<Option<Doubt>>) -> Outcome {
-        let stopped = rival.is_none();
+    /// `rivals` is `None` if the search was stopped.
+    pub(super) fn outcome(mut self, rivals: Option<Rivals>) -> Outcome {
+        let stopped = rivals.is_none();
         if stopped && self.starts == 0 {
             // Stopped before a run ended: a single iteration is the answer.
             self.runner.prepare(self.problem);
@@ -71,14 +68,14 @@ impl<const D: usize> Race<'_, D> {
         Outcome {
             starts: self.starts,
             stopped,
-            rival: rival.flatten(),
+            rivals: rivals.unwrap_or_default(),
             symmetric: any && self.is_symmetric(),
         }
     }
 
     /// Tries the starts in turn until the best run leaves no doubt, then averages over the scales of
-    /// the prior. Returns a rival of the answer.
-    fn search(&mut self) -> ControlFlow<(), Option<Doubt>> {
+    /// the prior. Returns the rivals of the answer.
+    fn search(&mut self) -> ControlFlow<(), Rivals> {
         let follows = self.problem.is_dense() && self.has(Mechanism::Motions);
         if follows {
             self.run(Start::Moved, MOVED)?;
@@ -94,12 +91,12 @@ impl<const D: usize> Race<'_, D> {
             }
             self.starts += runs;
         }
-        let rival = self.look_for_rivals()?;
+        let rivals = self.look_for_rivals()?;
         let noisy = self.best.sigma > self.problem.limits.clean;
         if noisy && !self.best.noisy && self.has(Mechanism::Scales) && self.problem.bends() {
             self.average_scales()?;
         }
-        ControlFlow::Continue(rival)
+        ControlFlow::Continue(rivals)
     }
 
     /// Tries the starts that do not use the unmoved sets, until the best run leaves no doubt.

@@ -103,8 +103,7 @@ fn a_lattice_beyond_the_view_is_right_or_named() {
                 let scene = format!("{hexagonal} {noise} {degrees} {shift}: {right}, {doubt:?}");
                 match doubt {
                     Some(Doubt::Repeats { step }) => {
-                        let length = step.iter().map(|s| s * s).sum::<f64>().sqrt();
-                        assert!((9.0..15.0).contains(&length), "{scene}");
+                        assert!((9.0..15.0).contains(&step.length()), "{scene}");
                         assert!(shift != 1.0, "{scene}");
                     }
                     other => assert!(other.is_none() && right == 1.0, "{scene}"),
