@@ -1,7 +1,7 @@
 //! A rectangle of pixels.
 
 #[cfg(feature = "ndarray")]
-use ndarray::{ArrayView2, ArrayViewMut2, Axis, Slice};
+use ndarray::{ArrayView1, ArrayView2, ArrayViewMut2, Axis, Slice};
 
 /// A rectangle of pixels, half open: rows `row_start..row_end` and columns
 /// `column_start..column_end`.
@@ -25,6 +25,15 @@ pub struct BoundingBox {
     pub column_start: usize,
     /// One past the last column.
     pub column_end: usize,
+}
+
+/// Whether a pixel is inside. A fold without an early exit is computed with SIMD instructions.
+#[cfg(feature = "ndarray")]
+fn any_inside(line: ArrayView1<'_, bool>) -> bool {
+    match line.to_slice() {
+        Some(line) => line.iter().fold(false, |any, &inside| any | inside),
+        None => line.iter().any(|&inside| inside),
+    }
 }
 
 impl BoundingBox {
@@ -57,24 +66,27 @@ impl BoundingBox {
     pub fn of_mask(mask: ArrayView2<'_, bool>) -> Option<Self> {
         let mut bounds: Option<Self> = None;
         for (row, line) in mask.outer_iter().enumerate() {
-            // Most rows of a large frame are empty. A fold without an early exit is computed with
-            // SIMD instructions.
-            if let Some(line) = line.to_slice()
-                && !line.iter().fold(false, |any, &inside| any | inside)
-            {
+            // Columns beyond the bounds so far are all that a row can add.
+            let (left, right) = bounds.map_or((line.len(), 0), |b| (b.column_start, b.column_end));
+            if !any_inside(line) {
                 continue;
             }
-            let Some(first) = line.iter().position(|&inside| inside) else {
-                continue;
-            };
-            let last = line.iter().rposition(|&inside| inside).unwrap_or(first);
-            let run = Self {
-                row_start: row,
+            let before = line.slice_axis(Axis(0), Slice::from(..left));
+            let after = line.slice_axis(Axis(0), Slice::from(right..));
+            let mut columns = left..right;
+            if any_inside(before) {
+                columns.start = before.iter().position(|&inside| inside).unwrap_or(left);
+            }
+            if any_inside(after) {
+                let last = after.iter().rposition(|&inside| inside);
+                columns.end = last.map_or(right, |last| right + last + 1);
+            }
+            bounds = Some(Self {
+                row_start: bounds.map_or(row, |bounds| bounds.row_start),
                 row_end: row + 1,
-                column_start: first,
-                column_end: last + 1,
-            };
-            bounds = Some(bounds.map_or(run, |bounds| bounds.union(run)));
+                column_start: columns.start,
+                column_end: columns.end,
+            });
         }
         bounds
     }
@@ -172,6 +184,38 @@ impl BoundingBox {
             row_end: (self.row_end + margin).min(rows),
             column_start: self.column_start.saturating_sub(margin),
             column_end: (self.column_end + margin).min(columns),
+        }
+    }
+}
+
+#[cfg(all(test, feature = "ndarray"))]
+mod tests {
+    use super::*;
+    use ndarray::Array2;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_mask_has_the_box_of_its_pixels(
+            pixels in proptest::collection::vec((0..9_usize, 0..12_usize), 0..6), transposed: bool,
+        ) {
+            let mut mask = Array2::from_elem((9, 12), false);
+            pixels.iter().for_each(|&at| mask[at] = true);
+            let place = |&(row, column): &(usize, usize)| match transposed {
+                true => [column, row],
+                false => [row, column],
+            };
+            let places: Vec<_> = pixels.iter().map(place).collect();
+            let end = |k: usize| places.iter().map(|p| p[k] + 1).max();
+            let start = |k: usize| places.iter().map(|p| p[k]).min();
+            let expected = start(0).map(|row_start| BoundingBox {
+                row_start,
+                row_end: end(0).unwrap(),
+                column_start: start(1).unwrap(),
+                column_end: end(1).unwrap(),
+            });
+            let mask = if transposed { mask.t() } else { mask.view() };
+            prop_assert_eq!(BoundingBox::of_mask(mask), expected);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The single pass over a frame, the reference it is compared with, and the noise of both.
 
-use ndarray::{Array2, ArrayView2, Axis, AxisDescription, Slice};
+use ndarray::{Array2, ArrayView2, Axis, AxisDescription, Slice, Zip};
 use tactile_core::{BoundingBox, Estimate};
 
 use crate::error::ForceError;
@@ -386,10 +386,12 @@ impl ReferenceFrame {
                     let row = image.index_axis_move(Axis(0), row);
                     row.slice_axis_move(Axis(0), Slice::from(span.clone()))
                 });
-                for (k, (&f, &r)) in frame.iter().zip(reference).enumerate() {
-                    counts[k % 2][usize::from(255 + u16::from(f) - u16::from(r))] += 1;
+                let mut turn = 0;
+                Zip::from(frame).and(reference).for_each(|&f, &r| {
+                    counts[turn][usize::from(255 + u16::from(f) - u16::from(r))] += 1;
                     sum += i64::from(f) - i64::from(r);
-                }
+                    turn = 1 - turn;
+                });
             }
             total += length;
             if length > 0 {
