@@ -35,7 +35,7 @@ impl Hidden {
             context.row(&format!("{:.1} mm deep", 1e3 * depth), text);
         }
         if let Some([x, y]) = self.0.next_position_m {
-            let place = format!("at ({:.1}, {:.1}) mm would search most", 1e3 * x, 1e3 * y);
+            let place = format!("at ({:.1}, {:.1}) mm would show most", 1e3 * x, 1e3 * y);
             context.row("next press", place);
         }
     }

@@ -253,7 +253,9 @@ pub(crate) fn run(arguments: &InclusionArguments, context: &mut Context) -> Resu
     let mut hidden = None;
     if let (Some(contrast), Some(loaded)) = (arguments.hidden, &scan.loaded) {
         // The found inclusion is valid, even if the limits cannot be computed.
-        let found = context.reported("what could hide", |report| loaded.hidden(contrast, report));
+        let found = context.reported("what could hide", |report| {
+            loaded.hidden(&estimate, contrast, report)
+        });
         match found.map(Hidden) {
             Ok(found) => {
                 found.print(context);

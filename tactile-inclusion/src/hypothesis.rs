@@ -118,7 +118,9 @@ fn apparent(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
     let of_place = [0, 1].map(|k| {
         change(Coordinate::Centre(k), &|press| {
             let aside = parameters.place.centre_m[k] - positions.axis_m(press, parameters)[k];
-            APPARENT_PLACE * deep_m * (asides_m[press] / radius_m).powi(3) * aside / radius_m
+            // A press from which the inclusion is beyond the rim hardly shows it.
+            let far = (asides_m[press] / radius_m).min(cells.reach_m / radius_m);
+            APPARENT_PLACE * deep_m * far.powi(4) * aside / asides_m[press].max(f64::MIN_POSITIVE)
         })
     });
     let of_place = of_place.into_iter().flatten().reduce(|x, y| x + y);

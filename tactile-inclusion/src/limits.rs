@@ -1,5 +1,6 @@
 //! The smallest inclusion that can be found at each position.
 
+use crate::estimate::InclusionEstimate;
 use crate::first_fits::HomogeneousFit;
 use crate::forward::{Forward, Solved};
 use crate::hypothesis::Assessed;
@@ -8,6 +9,7 @@ use crate::parameters::{LumpParameters, Parameters};
 use crate::progress::Counter;
 use crate::scan::Scan;
 use crate::starts::DEEPEST;
+use core::cmp::Ordering;
 use core::ops::ControlFlow;
 use tactile_core::Progress;
 use tactile_elasticity::{ElasticityError, Quantity};
@@ -51,7 +53,8 @@ impl InclusionSearch {
     /// })?;
     /// println!("6 mm deep, balls of up to {:.1} mm can hide", 1e3 * limits[1][0]);
     /// let beside = [[16e-3, 0.0], [0.0, 16e-3]];
-    /// let next = search.next_position(&scan, &places, &limits, &beside);
+    /// let estimate = search.search_scan(&scan, &mut |_| ControlFlow::Continue(()))?;
+    /// let next = search.next_position(&scan, &estimate, &places, &limits, &beside);
     /// # Ok(())
     /// # }
     /// ```
@@ -89,12 +92,7 @@ impl InclusionSearch {
         let normal = problem.normal(&fit.parameters, Some(&fit.normal.solved));
         let normal = normal.ok_or(ElasticityError::NoSolution)?;
         let plain = Assessed::new(&problem, &normal).ok_or(ElasticityError::NoSolution)?;
-        let axes_m = scan.presses.iter().map(|press| press.axis_m);
         let reach_m = USED_FACE * self.guide().radius_m();
-        let is_searched = |[x, y]: &[f64; 2]| {
-            let mut axes_m = axes_m.clone();
-            axes_m.any(|axis| (x - axis[0]).hypot(y - axis[1]) <= reach_m)
-        };
         let mut limits = Vec::new();
         for &depth_m in depths_m {
             let mut balls = Vec::new();
@@ -110,7 +108,7 @@ impl InclusionSearch {
                 }
             }
             let limit = |place: &[f64; 2]| {
-                if !is_searched(place) {
+                if scan.nearest_press_m(*place) > reach_m {
                     return f64::INFINITY;
                 }
                 let gain = |ball: &Ball| {
@@ -124,8 +122,11 @@ impl InclusionSearch {
         Ok(limits)
     }
 
-    /// The position of `candidates_m` at which the next press of a scan searches most. There the
-    /// mean volume of the balls that could be hidden under the used part of the face is largest.
+    /// The position of `candidates_m` for the next press of a scan.
+    ///
+    /// If the size of an inclusion of `estimate` is open, and a sixth of it lies outside the used
+    /// part of the face in every press, this is the candidate nearest to it. Otherwise it is where
+    /// the mean volume of the balls that could be hidden under the used part of the face is largest.
     /// `limits_m` are [`Self::detection_limits`] at `places_m`. In unsearched regions a ball as
     /// wide as the face's radius could be hidden. Among equally good candidates, the one nearest to
     /// the presses of the scan is chosen. `None` if no candidate has any of these positions under
@@ -133,40 +134,42 @@ impl InclusionSearch {
     pub fn next_position(
         &self,
         scan: &Scan,
+        estimate: &InclusionEstimate,
         places_m: &[[f64; 2]],
         limits_m: &[Vec<f64>],
         candidates_m: &[[f64; 2]],
     ) -> Option<[f64; 2]> {
         let face_m = self.guide().radius_m();
+        let reach_m = USED_FACE * face_m;
+        let away = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+        let cut = estimate.inclusions().into_iter().filter_map(|inclusion| {
+            let place = inclusion.position_m?.map(|told| told.value);
+            let diameter = inclusion.diameter_m;
+            let is_cut = scan.nearest_press_m(place) + diameter.estimate().value / 3.0 > reach_m;
+            (is_cut && diameter.value().is_none()).then_some(place)
+        });
+        let mut above = cut.filter_map(|place| {
+            let nearer = candidates_m.iter().copied();
+            nearer
+                .filter(|candidate| away(*candidate, place) < scan.nearest_press_m(place))
+                .min_by(|a, b| away(*a, place).total_cmp(&away(*b, place)))
+        });
         let volume = |limit: &f64| (limit / face_m).min(1.0).powi(3);
         let hidden = |place: usize| {
             let limits = limits_m.iter().filter_map(|limits| limits.get(place));
             limits.map(volume).sum()
         };
         let hidden: Vec<f64> = (0..places_m.len()).map(hidden).collect();
-        let away = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
         let found = candidates_m.iter().filter_map(|&candidate| {
             let under = places_m.iter().zip(&hidden);
-            let under = under.filter(|(place, _)| away(**place, candidate) <= USED_FACE * face_m);
+            let under = under.filter(|(place, _)| away(**place, candidate) <= reach_m);
             let (sum, count) = under.fold((0.0, 0), |(sum, n), (_, hidden)| (sum + hidden, n + 1));
-            let presses = scan
-                .presses
-                .iter()
-                .map(|press| away(press.axis_m, candidate));
-            let nearest = presses.fold(f64::INFINITY, f64::min);
-            (count > 0).then_some((sum / f64::from(count), nearest, candidate))
-        });
-        let best = found.reduce(|best, other| {
             // Equal fractions of positions differ by rounding.
-            let is_better = other.0 > best.0 + 1e-9;
-            let is_as_good_and_nearer = other.0 > best.0 - 1e-9 && other.1 < best.1;
-            if is_better || is_as_good_and_nearer {
-                other
-            } else {
-                best
-            }
+            let searched = (-1e9 * sum / f64::from(count)).round();
+            (count > 0).then_some(([searched, scan.nearest_press_m(candidate)], candidate))
         });
-        best.map(|(_, _, candidate)| candidate)
+        let best = found.min_by(|a, b| a.0.partial_cmp(&b.0).unwrap_or(Ordering::Equal));
+        above.next().or(best.map(|(_, candidate)| candidate))
     }
 }
 

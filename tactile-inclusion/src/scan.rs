@@ -52,6 +52,13 @@ pub struct ScanPress {
 }
 
 impl Scan {
+    /// Distance of a position from the stated axis of the nearest press.
+    pub(crate) fn nearest_press_m(&self, [x, y]: [f64; 2]) -> f64 {
+        let axes_m = self.presses.iter().map(|press| press.axis_m);
+        let distances = axes_m.map(|axis| (x - axis[0]).hypot(y - axis[1]));
+        distances.fold(f64::INFINITY, f64::min)
+    }
+
     /// The cells of all presses within a radius, and their frames side by side.
     ///
     /// # Errors

@@ -41,9 +41,10 @@ pub(crate) fn inclusion_of_scene(
     let mut signals = Signals::new();
     let found = py.detach(|| loaded.estimate(&mut |_| signals.check()));
     signals.finish()?;
-    let mut found = result(py, &found.map_err(errors::refused)?)?;
+    let estimate = found.map_err(errors::refused)?;
+    let mut found = result(py, &estimate)?;
     if let Some(contrast) = hidden {
-        let hidden = py.detach(|| loaded.hidden(contrast, &mut |_| signals.check()));
+        let hidden = py.detach(|| loaded.hidden(&estimate, contrast, &mut |_| signals.check()));
         signals.finish()?;
         let hidden = hidden.map_err(errors::refused)?;
         found.hidden = Some(Py::new(

@@ -696,7 +696,7 @@ result! {
         depths: Vector<f64>,
         /// Diameters in metres by depth and position, (k, n). Infinite if no ball would be found.
         diameters: Matrix<f64>,
-        /// Position in metres where the next press would search most. None if there is no place.
+        /// Position in metres where the next press would show most. None if there is no place.
         next_position: Option<(f64, f64)>,
     }
 }

@@ -3,7 +3,7 @@ use super::inclusion::LoadedInclusion;
 use core::ops::ControlFlow;
 use serde::Serialize;
 use tactile_imaging::elasticity::{ElasticityError, Quantity};
-use tactile_imaging::inclusion::Progress;
+use tactile_imaging::inclusion::{InclusionEstimate, Progress};
 
 /// Number of positions across a face: the limits change little from one to the next.
 const PLACES: f64 = 16.0;
@@ -14,7 +14,8 @@ const PLACES: f64 = 16.0;
 /// # use core::ops::ControlFlow;
 /// use tactile_files::scene::InclusionScene;
 /// let loaded = InclusionScene::read("scan.toml")?.load()?;
-/// let hidden = loaded.hidden(4.0, &mut |_| ControlFlow::Continue(()))?;
+/// let estimate = loaded.estimate(&mut |_| ControlFlow::Continue(()))?;
+/// let hidden = loaded.hidden(&estimate, 4.0, &mut |_| ControlFlow::Continue(()))?;
 /// if let Some([x, y]) = hidden.next_position_m {
 ///     println!("press next at ({:.1}, {:.1}) mm", 1e3 * x, 1e3 * y);
 /// }
@@ -30,7 +31,8 @@ pub struct HiddenLumps {
     pub depths_m: Vec<f64>,
     /// One list per depth with one diameter per position: infinite if every ball would be missed.
     pub diameters_m: Vec<Vec<f64>>,
-    /// Position at which the next press would search most. `None` if there is no place for one.
+    /// Position at which the next press would show most: above a lump of `estimate` under the rim,
+    /// or where most could be hidden. `None` if there is no place for one.
     pub next_position_m: Option<[f64; 2]>,
     /// Positions of the axis of the guide in the presses.
     #[serde(skip)]
@@ -48,6 +50,7 @@ impl LoadedInclusion {
     /// Those of [`tactile_imaging::inclusion::InclusionSearch::detection_limits`].
     pub fn hidden(
         &self,
+        estimate: &InclusionEstimate,
         contrast: f64,
         progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<HiddenLumps, ElasticityError> {
@@ -88,7 +91,7 @@ impl LoadedInclusion {
             .filter(|place| found.from_press(*place) >= 0.5 * reach_m)
             .collect();
         let (places, limits) = (&found.positions_m, &found.diameters_m);
-        found.next_position_m = search.next_position(scan, places, limits, &candidates);
+        found.next_position_m = search.next_position(scan, estimate, places, limits, &candidates);
         Ok(found)
     }
 }

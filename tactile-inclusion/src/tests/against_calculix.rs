@@ -4,12 +4,10 @@
 //! elements of `size_mm`, one row per load.
 #![allow(clippy::print_stdout)]
 
-use super::{block, forward, lump, search};
+use super::{block, cells, forward, lump, search};
 use crate::forward::Forward;
 use crate::parameters::{Parameters, Place};
-use crate::picture::{CellPositions, Cells};
 use std::collections::BTreeMap;
-use std::sync::Arc;
 use tactile_fem::{Guide, GuideLayer, Interface, Material};
 
 /// A block at one approach: the model's input and CalculiX's results.
@@ -115,17 +113,7 @@ fn off_calculix(place: Place) -> f64 {
         guide: guide(16e-3),
         approaches_m: vec![3e-3],
         radii_m: positions_m.iter().map(|[x, _]| x.abs()).collect(),
-        cells: Some(Cells {
-            positions: Arc::new(CellPositions {
-                presses: vec![0; positions_m.len()],
-                axes_m: vec![[0.0; 2]],
-                positions_m,
-            }),
-            plain: None,
-            squeezed: vec![0.1],
-            face_radius_m: 16e-3,
-            reach_m: 12e-3,
-        }),
+        cells: Some(cells(positions_m, &[3e-3])),
         ..forward(5)
     };
     let found = forward.with_plain(&parameters).unwrap();

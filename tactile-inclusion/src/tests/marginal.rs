@@ -29,14 +29,12 @@ fn a_gaussian_has_its_own_interval_and_evidence() {
     let other = 1.96 * f64::hypot(0.5 * error, 0.2);
     for (coordinate, reach) in [(1, own), (0, other)] {
         let [low, high] = marginal.interval(coordinate);
-        assert!(
-            (high / reach - 1.0).abs() < 0.03,
-            "{coordinate}: {high} {reach}"
-        );
-        assert!(
-            (low / reach + 1.0).abs() < 0.03,
-            "{coordinate}: {low} {reach}"
-        );
+        for end in [high, -low] {
+            assert!(
+                (end / reach - 1.0).abs() < 0.03,
+                "{coordinate}: {end} {reach}"
+            );
+        }
     }
     assert!(marginal.gain.abs() < 0.03, "{}", marginal.gain);
     let correlation = marginal.covariance()[(0, 1)] / (0.3 * f64::hypot(0.15, 0.2));
@@ -47,13 +45,7 @@ fn a_gaussian_has_its_own_interval_and_evidence() {
 fn a_ridge_that_is_open_upwards_reaches_further_there() {
     // The density falls like a Gaussian of width 0.2 below and three times that above: a quarter
     // and three quarters of the probability.
-    let fall = |x: f64| {
-        if x < 0.0 {
-            12.5 * x * x
-        } else {
-            12.5 / 9.0 * x * x
-        }
-    };
+    let fall = |x: f64| x * x * if x < 0.0 { 12.5 } else { 12.5 / 9.0 };
     let nodes = [-0.5, -0.25, 0.0, 0.6, 1.2, 1.8];
     let marginal = Marginal::new(&ridge(&nodes, |x| -fall(x), 0.0), None).unwrap();
     let [low, high] = marginal.interval(1);

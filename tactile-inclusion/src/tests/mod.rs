@@ -1,13 +1,14 @@
 //! The forward model and its derivatives, and the input that a search rejects.
 
 use crate::forward::Forward;
-use crate::parameters::Place;
-use crate::parameters::{Coordinate, LARGEST_POISSON_RATIO, LumpParameters, Parameters};
+use crate::parameters::{Coordinate, LARGEST_POISSON_RATIO, LumpParameters, Parameters, Place};
+use crate::picture::{CellPositions, Cells};
 use crate::{
     AssumedInclusion, Identifiable, InclusionEstimate, InclusionSearch, InclusionWarning,
     PressureProfile, SearchVerdict, TissueBlock,
 };
 use core::ops::ControlFlow;
+use std::sync::Arc;
 use tactile_elasticity::ElasticityError;
 use tactile_fem::{Guide, GuideLayer, Interface, Kinematics, Material};
 
@@ -44,6 +45,21 @@ fn forward(fineness: usize) -> Forward {
         cells: None,
         fineness,
         kinematics: Kinematics::Finite,
+    }
+}
+
+/// Cells of one press.
+fn cells(positions_m: Vec<[f64; 2]>, approaches_m: &[f64]) -> Cells {
+    Cells {
+        positions: Arc::new(CellPositions {
+            presses: vec![0; positions_m.len()],
+            axes_m: vec![[0.0; 2]],
+            positions_m,
+        }),
+        plain: None,
+        squeezed: approaches_m.iter().map(|a| a / 30e-3).collect(),
+        face_radius_m: 16e-3,
+        reach_m: 12e-3,
     }
 }
 
