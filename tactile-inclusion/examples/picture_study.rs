@@ -1,7 +1,7 @@
 //! Errors of the search in the whole face, on a folder of blocks solved in three dimensions.
 //!
 //! ```text
-//! cargo run --release -p tactile-inclusion --example picture_study -- FOLDER [DRAWS] [NAMES] [scan] [hand] [wide]
+//! cargo run --release -p tactile-inclusion --example picture_study -- FOLDER [DRAWS] [NAMES] [scan] [hand=MM] [wide]
 //! ```
 //!
 //! FOLDER contains `scenes.csv` and for every scene a file `NAME.csv` (load_index, x_m, y_m,
@@ -12,7 +12,7 @@
 //!
 //! With `scan`, scenes of one lump at several distances from the axis, with names `LUMP_x…`, are the
 //! presses of scans. Each draw has one to four presses in random directions from the lump, on cells
-//! of 2 mm, placed with an error of 0.2 mm. With `hand` this error is 2 mm, and each approach of
+//! of 2 mm, placed with an error of 0.2 mm. With `hand=MM` this error is MM mm, and each approach of
 //! each press has an error of 0.2 mm.
 //!
 //! With `wide`, each draw is a scan of 60 × 60 mm with five or nine presses, 22 mm apart along x and
@@ -222,8 +222,8 @@ impl Tally {
     /// Prints and counts a quantity with its true value.
     fn add(&mut self, name: &'static str, value: f64, [low, high]: [f64; 2], truth: f64) -> bool {
         // The interval of a ball's shape may be a single point.
-        let holds = (low * (1.0 - 1e-9)..=high * (1.0 + 1e-9)).contains(&truth)
-            || (low..=high).contains(&truth);
+        let slack = 1e-9 * truth.abs();
+        let holds = (low - slack..=high + slack).contains(&truth);
         print!(
             "; {name} {value:.3e} [{low:.3e} {high:.3e}]{}",
             if holds { "" } else { " WRONG" }
@@ -379,20 +379,15 @@ fn search(
 fn main() -> Outcome<()> {
     let (words, mut arguments): (Vec<String>, Vec<String>) = std::env::args()
         .skip(1)
-        .partition(|word| ["scan", "hand", "wide"].contains(&word.as_str()));
+        .partition(|word| ["scan", "wide"].contains(&word.as_str()) || word.starts_with("hand="));
     arguments.resize(3, String::new());
     let is_wide = words.contains(&"wide".to_owned());
     let is_scan = is_wide || words.contains(&"scan".to_owned());
-    let hand = if words.contains(&"hand".to_owned()) {
-        Hand {
-            place_m: 2e-3,
-            each_approach_m: 0.2e-3,
-        }
-    } else {
-        Hand {
-            place_m: if is_scan { 0.2e-3 } else { 0.0 },
-            each_approach_m: 0.0,
-        }
+    let by_hand = words.iter().find_map(|word| word.strip_prefix("hand="));
+    let place_mm = by_hand.map_or(Ok(if is_scan { 0.2 } else { 0.0 }), str::parse::<f64>)?;
+    let hand = Hand {
+        place_m: 1e-3 * place_mm,
+        each_approach_m: if by_hand.is_some() { 0.2e-3 } else { 0.0 },
     };
     let [folder, draws, names] = [0, 1, 2].map(|k| arguments[k].as_str());
     let draws: u64 = if draws.is_empty() { 1 } else { draws.parse()? };
