@@ -136,6 +136,10 @@ impl MarkersArguments {
         let largest = field.largest_px();
         let by = largest.map_or_else(|| "0".to_owned(), |px| in_unit(px, 1.0));
         context.row("followed", format_args!("{followed}, by {by} px at most"));
+        if let Some(step) = field.period {
+            let text = format_args!("{step}: the smallest motion since the last frame");
+            context.row("assumed", text);
+        }
         if let Some(doubt) = &field.doubt {
             let sentence = PairsDoubt::Matcher(*doubt);
             context.warn("doubtful_pairs", json!({ "frame": frame }), sentence);
@@ -162,7 +166,7 @@ impl MarkersArguments {
         json!({
             "frame": frame, "followed": followed, "largest_displacement_px": largest.map_or(0.0, |px| px.value),
             "doubt": field.doubt.map(|doubt| PairsDoubt::Matcher(doubt).to_string()),
-            "strain": strain, "shear": shear,
+            "period": field.period.map(|step| step.0[..2].to_vec()), "strain": strain, "shear": shear,
         })
     }
 }

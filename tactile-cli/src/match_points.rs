@@ -323,7 +323,8 @@ fn solve<const D: usize>(
         "assignment": matching.assignment, "confidence": matching.confidence,
         "unmatched_share": 1.0 - matched as f64 / points as f64,
         "residual": report.residual, "noise": report.sigma, "stop": stop, "doubt": doubt,
-        "period": report.period.map(|step| step.0), "judged": report.judgement != Judgement::NotJudged,
+        "period": report.period.map(|step| step.0[..D].to_vec()),
+        "judged": report.judgement != Judgement::NotJudged,
         "iterations": iterations, "starts": starts, "time_ms": ms,
     });
     if let Some(transformation) = transformation {

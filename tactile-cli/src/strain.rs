@@ -485,7 +485,7 @@ impl<const D: usize> StrainReport<D> {
                 "degrees_of_freedom": found.degrees_of_freedom,
                 "folded_points": found.summary.folded,
                 "doubt": found.doubt.map(|doubt| doubt.to_string()),
-                "period": found.period.map(|step| step.0),
+                "period": found.period.map(|step| step.0[..D].to_vec()),
                 "components": components_json(found),
             }),
             Err(reason) => json!({ "error": reason }),

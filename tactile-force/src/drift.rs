@@ -441,7 +441,8 @@ impl BackgroundSums {
         let mut before = None;
         let rows = levels.own.iter().zip(&levels.changes).zip(&levels.pixels);
         for (((&own, &change), &count), residual) in rows.zip(residuals) {
-            if *residual > limit {
+            let is_near = *residual <= limit;
+            if !is_near {
                 continue;
             }
             let other = before.replace(own).unwrap_or(own);

@@ -4,7 +4,7 @@
 use nalgebra::{Matrix2, Point2, Rotation2, Vector2};
 use tactile_core::Estimate;
 use tactile_core::statistics::median;
-use tactile_match::{AnnealedSoftassign, Doubt, MatchError, PointMatcher};
+use tactile_match::{AnnealedSoftassign, Doubt, LatticeStep, MatchError, PointMatcher};
 use tactile_tps::{LocalField, LocalValue, nearest_rows};
 
 use crate::markers::Marker;
@@ -77,6 +77,9 @@ pub struct MarkerField {
     pub tracks: Vec<MarkerTrack>,
     /// The matcher's doubt about the pairs. `None` if it has none.
     pub doubt: Option<Doubt>,
+    /// The lattice step by which the pairs of the last two frames can be shifted: the smallest
+    /// motion is assumed.
+    pub period: Option<LatticeStep>,
     /// Positions in the last frame without a doubt.
     known: Vec<Point2<f64>>,
     matcher: AnnealedSoftassign,
@@ -158,6 +161,7 @@ impl MarkerField {
         Self {
             tracks: reference.iter().enumerate().map(track).collect(),
             doubt: None,
+            period: None,
             known: reference.iter().map(|marker| marker.position_px).collect(),
             matcher: AnnealedSoftassign::default(),
         }
@@ -188,7 +192,7 @@ impl MarkerField {
                 matching = other;
             }
         }
-        let doubt = matching.report.doubt();
+        let (doubt, period) = (matching.report.doubt(), matching.report.period);
         let tracks = self.tracks_to(matching.assignment, frame);
         Ok(Self {
             known: match doubt {
@@ -197,6 +201,7 @@ impl MarkerField {
             },
             tracks,
             doubt,
+            period,
             matcher: self.matcher,
         })
     }

@@ -674,7 +674,8 @@ impl<const D: usize> Registration<D> {
                 .push(covariance * (scale * scale));
         }
         found.energy.clone_from(&self.energy);
-        found.report.judgement = Judgement::of_pairs(model, target, &found.assignment);
+        (found.report.judgement, found.report.period) =
+            Judgement::of_pairs(model, target, &found.assignment);
         found.report.stop = self.stop;
         found.report.iterations = self.energy.len();
         found.report.sigma = scale * self.sigma2.sqrt();

@@ -108,7 +108,8 @@ fn matching<const D: usize>(
         found.soft.push_row(kept);
     }
     found.energy = vec![total * scale * scale];
-    found.report.judgement = Judgement::of_pairs(model, target, &found.assignment);
+    (found.report.judgement, found.report.period) =
+        Judgement::of_pairs(model, target, &found.assignment);
     (found.report.stop, found.report.iterations) = (StopReason::Converged, 1);
     found
 }

@@ -206,19 +206,21 @@ const REACH: f64 = 5.0;
 const WHOLE: [f64; 2] = [0.995, 0.25];
 
 impl Judgement {
-    /// Judges pairs by the motions of neighbours: `O(n)` for each of [`SAMPLE`] pairs.
+    /// Judges pairs by the motions of neighbours: `O(n)` for each of [`SAMPLE`] pairs. Returns also
+    /// the step of a lattice by which they can be shifted.
     pub(crate) fn of_pairs<const D: usize>(
         model: &[Point<f64, D>],
         target: &[Point<f64, D>],
         assignment: &[Option<usize>],
-    ) -> Self {
+    ) -> (Self, Option<LatticeStep>) {
+        let doubtful = |doubt| (Self::Doubtful(doubt), None);
         let scale = centre_and_radius(model).1.max(f64::MIN_POSITIVE);
         let rows = model.iter().zip(assignment);
         let pairs: Vec<_> = rows
             .filter_map(|(x, j)| Some((x.coords / scale, (target[(*j)?] - x) / scale)))
             .collect();
         if (pairs.len() as f64) < LEAST_PAIRED * model.len().min(target.len()) as f64 {
-            return Self::Doubtful(Doubt::FewPairs);
+            return doubtful(Doubt::FewPairs);
         }
         let step = pairs.len().div_ceil(SAMPLE).max(1);
         let sample = (0..pairs.len()).step_by(step);
@@ -227,18 +229,21 @@ impl Judgement {
         let scaled: Vec<[f64; D]> = scaled.map(Into::into).collect();
         let spacing = typical_spacing(&scaled, SAMPLE, &mut Vec::new());
         if misfits.is_empty() || spacing <= 0.0 {
-            return Self::NotJudged;
+            return (Self::NotJudged, None);
         }
         let variance = median(&mut misfits.clone()) / median_of_chi_squared(D);
         let limit = (OFF[0] * variance.sqrt()).max(OFF[1] * spacing).powi(2);
         let off = misfits.iter().filter(|&&misfit| misfit > limit).count();
         if variance.sqrt() > MOST_NOISE * spacing {
-            return Self::Doubtful(Doubt::LargeResiduals);
+            return doubtful(Doubt::LargeResiduals);
         }
         if off as f64 > MOST_OFF * misfits.len() as f64 {
-            return Self::Doubtful(Doubt::Undecided);
+            return doubtful(Doubt::Undecided);
         }
-        repeats(model, target, &pairs, scale).map_or(Self::Sure, Self::Doubtful)
+        match repeats(model, target, &pairs, scale) {
+            Some((step, true)) => (Self::Doubtful(Doubt::Repeats { step }), Some(step)),
+            found => (Self::Sure, found.map(|(step, _)| step)),
+        }
     }
 }
 
@@ -285,14 +290,14 @@ fn misfit<const D: usize>(pairs: &Motions<D>, row: usize) -> Option<f64> {
     Some(left.norm_squared() / variance)
 }
 
-/// The lattice step by which the answer can be shifted so that it fits the targets equally well,
-/// with a motion that is not much larger.
+/// The lattice step by which the answer can be shifted so that it fits the targets equally well
+/// with the least motion, and whether that is not much larger.
 fn repeats<const D: usize>(
     model: &[Point<f64, D>],
     target: &[Point<f64, D>],
     pairs: &Motions<D>,
     scale: f64,
-) -> Option<Doubt> {
+) -> Option<(LatticeStep, bool)> {
     let centre = centre_and_radius(model).0;
     let from = model.iter().min_by(|a, b| {
         let square = |p: &Point<f64, D>| (p.coords - centre).norm_squared();
@@ -319,18 +324,21 @@ fn repeats<const D: usize>(
     let sampled = || model.iter().step_by(model.len().div_ceil(SAMPLE));
     let repeated = |step: &SVector<f64, D>| {
         let near = NEAR_STEP * step.norm();
-        let meets = |p: &&Point<f64, D>| model.iter().any(|q| (q - **p - step).norm() < near);
-        sampled().filter(meets).count() as f64 >= REPEATED * sampled().count() as f64
+        let misses = |p: &&Point<f64, D>| model.iter().all(|q| (q - **p - step).norm() >= near);
+        let most = (1.0 - REPEATED) * sampled().count() as f64;
+        // Most steps of scattered points are given up after a part of the sample.
+        (sampled().filter(misses).take(most as usize + 1).count() as f64) <= most
     };
-    let step = others
+    let mut steps: Vec<_> = others
         .filter(|step| step.norm() <= LONGEST_STEP * shortest)
-        .filter(|step| root_mean_square(step) < REACH * own)
         .filter(|step| !(whole && changed > WHOLE[1] * step.norm()))
-        .find(repeated)?;
+        .map(|step| (root_mean_square(&step), step))
+        .collect();
+    steps.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (motion, step) = steps.into_iter().find(|(_, step)| repeated(step))?;
     let mut outward = [0.0; 3];
     (0..D).for_each(|k| outward[k] = step[k]);
-    let step = LatticeStep(outward);
-    Some(Doubt::Repeats { step })
+    Some((LatticeStep(outward), motion < REACH * own))
 }
 
 /// Median of the sum of `dimension` squared standard normal deviates, by the approximation of

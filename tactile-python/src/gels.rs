@@ -526,6 +526,7 @@ pub(crate) fn markers(
         positions: table(&|n, k| tracks[n].position_px[k]),
         displacements: table(&|n, k| tracks[n].displacement_px[k]),
         standard_errors: table(&|n, k| tracks[n].standard_errors_px[k]),
+        period: field.period.map(|step| step.0[..2].to_vec()),
         flags: field.doubt.iter().map(ToString::to_string).collect(),
     })
 }

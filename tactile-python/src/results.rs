@@ -316,6 +316,9 @@ result! {
         displacements: Matrix<f64>,
         /// Standard errors of a coordinate of the position and of the displacement, (n, 2).
         standard_errors: Matrix<f64>,
+        /// Step of a lattice by which the pairs can be shifted with an equal fit: the smallest
+        /// motion is assumed. `None` for points that do not repeat.
+        period: Option<Vec<f64>>,
         /// Doubts about the pairs, one sentence each.
         flags: Vec<String>,
     }
@@ -440,8 +443,8 @@ result! {
         von_mises: Matrix<f64>,
         /// Noise of one coordinate in the unit of the points.
         sigma: f64,
-        /// Step of a lattice by which the pairs can be shifted with an equal fit: the smallest motion is
-        /// assumed. `None` for points that do not repeat.
+        /// Step of a lattice by which the pairs can be shifted with an equal fit: the smallest
+        /// motion is assumed. `None` for points that do not repeat.
         period: Option<Vec<f64>>,
         /// Reasons why the pairs are unreliable, one sentence each.
         flags: Vec<String>,
@@ -511,8 +514,8 @@ result! {
         pairs: Matrix<i64>,
         /// Noise of one coordinate in the unit of the points.
         sigma: f64,
-        /// Step of a lattice by which the pairs can be shifted with an equal fit: the smallest motion is
-        /// assumed. `None` for points that do not repeat.
+        /// Step of a lattice by which the pairs can be shifted with an equal fit: the smallest
+        /// motion is assumed. `None` for points that do not repeat.
         period: Option<Vec<f64>>,
         /// Number of iterations.
         iterations: usize,

@@ -110,6 +110,7 @@ impl<const D: usize> SeriesReport<D> {
                     value[name] = json!({
                         "pairs": strain.rows.len(), "noise_per_coordinate": strain.sigma,
                         "doubt": strain.doubt.map(|doubt| doubt.to_string()),
+                        "period": strain.period.map(|step| step.0[..D].to_vec()),
                         "components": components_json(strain),
                     });
                 }

@@ -487,7 +487,8 @@ impl<const D: usize> Run<D> {
             let covariance = spread(places);
             found.displacement_covariance.push(covariance);
         }
-        found.report.judgement = Judgement::of_pairs(model, target, &found.assignment);
+        (found.report.judgement, found.report.period) =
+            Judgement::of_pairs(model, target, &found.assignment);
         found.report.stop = self.stop;
         found.report.iterations = self.energy.len();
         found.energy = self.energy;

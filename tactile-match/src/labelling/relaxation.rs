@@ -150,8 +150,7 @@ pub(super) fn relax<const D: usize>(
         factors: options.compatibility,
         longest,
     };
-    let [graph, table] = [&graphs[0], &graphs[1]];
-    let table = EdgeTable::new(table);
+    let (graph, table) = (&graphs[0], EdgeTable::new(&graphs[1]));
     let mut m = first_matches(model, target, options.temperature, options.slack);
     if let Some(count) = options.candidates {
         m.keep_likeliest(count);

@@ -87,7 +87,7 @@ impl<const D: usize> Race<'_, D> {
             if twin.is_some() {
                 return ControlFlow::Continue(Rivals {
                     doubt: twin,
-                    period: None,
+                    ..Rivals::default()
                 });
             }
         }

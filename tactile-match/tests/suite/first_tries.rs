@@ -3,7 +3,9 @@
 
 use crate::common::Stream;
 use nalgebra::{Point, Point2, Point3, SVector};
-use tactile_match::{AnnealedSoftassign, Doubt, Outliers, PointMatcher, Search};
+use tactile_match::{
+    AnnealedSoftassign, Doubt, LinearAssignment, NearestNeighbour, Outliers, PointMatcher, Search,
+};
 
 /// Points of both views, with the targets in another order. `partner[i]` is the target of model row
 /// `i`, or `None` if it is not in view.
@@ -110,6 +112,41 @@ fn a_lattice_beyond_the_view_is_right_or_named() {
                 }
             }
         }
+    }
+}
+
+/// A displacement of nearly a step looks like a small one the other way. Every matcher names the step
+/// by which its pairs may be off, and points that do not repeat have none.
+#[test]
+fn the_smallest_motion_of_a_lattice_is_stated() {
+    let matchers: [Box<dyn PointMatcher<2>>; 3] = [
+        Box::new(AnnealedSoftassign::default()),
+        Box::new(NearestNeighbour::default()),
+        Box::new(LinearAssignment::default()),
+    ];
+    let mut stream = Stream::new(3);
+    let scattered = random::<2>(200, &mut stream);
+    for matcher in matchers {
+        for hexagonal in [false, true] {
+            for shift in [8.5, 9.2] {
+                let views = lattice(hexagonal, 0.1, 0.0, shift);
+                let report = matcher
+                    .match_points(&views.model, &views.target)
+                    .unwrap()
+                    .report;
+                // Optimal assignment mixes the rows of a hexagonal lattice, which is a doubt.
+                let Some(step) = report.period else {
+                    assert_eq!(report.doubt(), Some(Doubt::LargeResiduals));
+                    assert!(hexagonal);
+                    continue;
+                };
+                // The noise of the targets moves the affine part by less than a per cent.
+                assert_eq!(report.doubt(), None);
+                assert!((step.length() / 10.0 - 1.0).abs() < 0.01, "{step}");
+            }
+        }
+        let report = matcher.match_points(&scattered, &scattered).unwrap().report;
+        assert_eq!((report.doubt(), report.period), (None, None));
     }
 }
 
