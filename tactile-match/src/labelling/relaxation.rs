@@ -8,7 +8,7 @@ use crate::{ShapeContexts, Watch};
 use nalgebra::Point;
 use std::ops::ControlFlow;
 
-/// Maximum number of products of candidates for which links are stored between sweeps (16 bytes
+/// Maximum number of products of candidates for which links are stored between sweeps (12 bytes
 /// each, of which about half are links). If there are more, each sweep computes them again.
 const MAX_STORED: usize = 1 << 26;
 
